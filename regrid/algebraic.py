@@ -30,8 +30,8 @@ from shockgrid.regrid.measure.quality import compute_corner_areas
 from shockgrid.regrid.protocol import RegridReport, RegridResult
 from shockgrid.regrid.sides import copy_sides
 
-# Rows of the scratch: along j, the spacing on i_min, its change towards i_max, the values on i_min
-# and their change towards i_max; then, along i, the same for the sides j_min and j_max.
+# Rows of the tables of `fill_tables`: along j, the spacing on i_min, its change towards i_max, the
+# values on i_min and their change towards i_max; along i, the same for the sides j_min and j_max.
 SPACING, SPACING_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y = range(6)
 
 
@@ -49,37 +49,57 @@ def fill_arc_spacing(x, y, spacing):
     spacing[last] = 1.0
 
 
+class RowBlend(NamedTuple):
+    """What the boolean sum (theory R6.4) takes of a row of nodes.
+
+    Its spacing on j_min and the change towards j_max; of its values beyond the corners' at either
+    end, `low_x` to `high_y`, the value on i_min and the change towards i_max; the values' mean.
+    """
+
+    spacing: float
+    spacing_change: float
+    low_x: tuple[float, float]
+    low_y: tuple[float, float]
+    high_x: tuple[float, float]
+    high_y: tuple[float, float]
+    mean_x: float
+    mean_y: float
+
+
 @inlined
 def take_blend(i, along_i, corners):
-    """What the boolean sum (theory R6.4) takes of row i: its spacing and change, corner terms."""
-    low_x, low_y = along_i[VALUE_X, i], along_i[VALUE_Y, i]
-    rise_x, rise_y = along_i[CHANGE_X, i], along_i[CHANGE_Y, i]
-    return (
+    """The `RowBlend` of row i, from the tables of `fill_tables`."""
+    value_x, value_y = along_i[VALUE_X, i], along_i[VALUE_Y, i]
+    change_x, change_y = along_i[CHANGE_X, i], along_i[CHANGE_Y, i]
+    return RowBlend(
         along_i[SPACING, i], along_i[SPACING_CHANGE, i],
-        (low_x - corners[0, 0], corners[0, 2] - corners[0, 0]),
-        (low_y - corners[1, 0], corners[1, 2] - corners[1, 0]),
-        (low_x + rise_x - corners[0, 1], corners[0, 3] - corners[0, 1]),
-        (low_y + rise_y - corners[1, 1], corners[1, 3] - corners[1, 1]),
+        (value_x - corners[0, 0], corners[0, 2] - corners[0, 0]),
+        (value_y - corners[1, 0], corners[1, 2] - corners[1, 0]),
+        (value_x + change_x - corners[0, 1], corners[0, 3] - corners[0, 1]),
+        (value_y + change_y - corners[1, 1], corners[1, 3] - corners[1, 1]),
         corners[0, 4], corners[1, 4],
     )  # fmt: skip
 
 
 @inlined
-def blend(row, spacing, bend, value_x, value_y, change_x, change_y):
+def blend(row, spacing, spacing_change, value_x, value_y, change_x, change_y):
     """Boolean sum (theory R6.4) of the sides' values at a node: x and y.
 
-    `row` is what `take_blend` gives of its row, the others are the rows along j at its column.
+    `row` is the `RowBlend` of its row, the others are the rows along j at its column.
     """
-    start, turn, under_x, under_y, over_x, over_y, mean_x, mean_y = row
-    blend_i = (start + spacing * turn) / (1.0 - turn * bend)
-    blend_j = spacing + blend_i * bend
-    # Corner terms of the boolean sum, folded into the part that runs along j.
-    low_x, low_y = under_x[0] - blend_i * under_x[1], under_y[0] - blend_i * under_y[1]
-    high_x, high_y = over_x[0] - blend_i * over_x[1], over_y[0] - blend_i * over_y[1]
+    turn = row.spacing_change
+    blend_i = (row.spacing + spacing * turn) / (1.0 - turn * spacing_change)
+    blend_j = spacing + blend_i * spacing_change
+    # corner terms of the boolean sum, folded into the part that runs along j
+    low_x, low_y = row.low_x[0] - blend_i * row.low_x[1], row.low_y[0] - blend_i * row.low_y[1]
+    high_x, high_y = (
+        row.high_x[0] - blend_i * row.high_x[1],
+        row.high_y[0] - blend_i * row.high_y[1],
+    )
     side_x, side_y = value_x + blend_i * change_x, value_y + blend_i * change_y
     return (
-        mean_x + (side_x + (low_x + blend_j * (high_x - low_x))),
-        mean_y + (side_y + (low_y + blend_j * (high_y - low_y))),
+        row.mean_x + (side_x + (low_x + blend_j * (high_x - low_x))),
+        row.mean_y + (side_y + (low_y + blend_j * (high_y - low_y))),
     )
 
 
@@ -87,12 +107,12 @@ def blend(row, spacing, bend, value_x, value_y, change_x, change_y):
 def fill_blend(along_i, along_j, corners, out):
     """Boolean sum (theory R6.4) of the sides' values into the inner nodes; rows as named above."""
     for i in range(1, out.shape[1] - 1):
-        here = take_blend(i, along_i, corners)
+        row_blend = take_blend(i, along_i, corners)
         row_x = out[0, i]
         row_y = out[1, i]
         for j in range(1, out.shape[2] - 1):
             row_x[j], row_y[j] = blend(
-                here, along_j[SPACING, j], along_j[SPACING_CHANGE, j], along_j[VALUE_X, j],
+                row_blend, along_j[SPACING, j], along_j[SPACING_CHANGE, j], along_j[VALUE_X, j],
                 along_j[VALUE_Y, j], along_j[CHANGE_X, j], along_j[CHANGE_Y, j],
             )  # fmt: skip
 
@@ -106,7 +126,8 @@ def fill_tables(spacings_of, values, moved, along_i, along_j, corners):
     `corners` (2, 5): (0, 0), (0, nj), (ni, 0), (ni, nj), and the mean that the values are beyond.
     """
     ni, nj = values.shape[1] - 1, values.shape[2] - 1
-    part = 1.0 if moved else 0.0
+    # 1 to take the grid's places from the values, else 0
+    subtracted = 1.0 if moved else 0.0
     # The value rows first hold the sides of the grid, for the spacings.
     for j, row in ((0, SPACING), (nj, SPACING_CHANGE)):
         for i in range(ni + 1):
@@ -116,24 +137,25 @@ def fill_tables(spacings_of, values, moved, along_i, along_j, corners):
     for i, row in ((0, SPACING), (ni, SPACING_CHANGE)):
         fill_arc_spacing(spacings_of[0, i], spacings_of[1, i], along_j[row])
     for k in range(2):
-        own = values[k]
-        spacings = spacings_of[k]
+        component = values[k]
+        places = spacings_of[k]
         value = VALUE_X + k
         change = CHANGE_X + k
-        first, second = own[0, 0] - part * spacings[0, 0], own[0, nj] - part * spacings[0, nj]
-        third = own[ni, 0] - part * spacings[ni, 0]
-        fourth = own[ni, nj] - part * spacings[ni, nj]
+        corner_1 = component[0, 0] - subtracted * places[0, 0]
+        corner_2 = component[0, nj] - subtracted * places[0, nj]
+        corner_3 = component[ni, 0] - subtracted * places[ni, 0]
+        corner_4 = component[ni, nj] - subtracted * places[ni, nj]
         # The mean is symmetric in the corners, so that a mirrored or transposed block gets the
         # same bits, and is the value itself where all agree: a block moved bodily keeps its shape.
-        mean = 0.25 * ((first + fourth) + (second + third))
+        mean = 0.25 * ((corner_1 + corner_4) + (corner_2 + corner_3))
         for i in range(ni + 1):
-            low = own[i, 0] - part * spacings[i, 0]
+            low = component[i, 0] - subtracted * places[i, 0]
             along_i[value, i] = low - mean
-            along_i[change, i] = (own[i, nj] - part * spacings[i, nj]) - low
+            along_i[change, i] = (component[i, nj] - subtracted * places[i, nj]) - low
         for j in range(nj + 1):
-            low = own[0, j] - part * spacings[0, j]
-            along_j[value, j] = low - mean
-            along_j[change, j] = (own[ni, j] - part * spacings[ni, j]) - low
+            near = component[0, j] - subtracted * places[0, j]
+            along_j[value, j] = near - mean
+            along_j[change, j] = (component[ni, j] - subtracted * places[ni, j]) - near
         corners[k, 0] = along_j[value, 0]
         corners[k, 1] = along_j[value, nj]
         corners[k, 2] = along_j[value, 0] + along_j[change, 0]
@@ -182,36 +204,38 @@ def fill_displacement(previous, boundary, out):
 class SideMotion(NamedTuple):
     """How the sides of a grid move, and the new `sides` (2, ni+1, nj+1) [m].
 
-    `along_i`, `along_j` and `corners` are those of `fill_tables`.  Lines j = const that keep
-    spacings of their own (theory R4.9) take their part of the change `turn` (2, nj+1) of their
-    way from i_min to i_max; `reach` (nj+1) is the most that this is on each line.
+    `along_i`, `along_j` and `corners` are those of `fill_tables`.  `chord_change` (2, nj+1) is the
+    change of each line's chord from i_min to i_max; lines j = const that keep spacings of their own
+    (theory R4.9) move by a part of it, at most by `reach` (nj+1).
     """
 
     sides: np.ndarray
     along_i: np.ndarray
     along_j: np.ndarray
     corners: np.ndarray
-    turn: np.ndarray
+    chord_change: np.ndarray
     reach: np.ndarray
 
 
 @kernel
-def prepare_motion(old, motion, most_bend, bent):
+def prepare_motion(old, motion, most_departure, departs):
     """Fill the tables of a `SideMotion` from the `old` grid to its sides; theory R6.5.
 
-    Where lines are `bent`, `most_bend` (nj+1) is how far their spacings depart at most.
+    Where a line `departs` from the sides' spacing, `most_departure` (nj+1) is by how much at most.
     """
     sides = motion.sides
-    turn = motion.turn
+    chord_change = motion.chord_change
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     fill_tables(old, sides, True, motion.along_i, motion.along_j, motion.corners)
-    if bent:
+    if departs:
         for j in range(nj + 1):
             for k in range(2):
-                way = sides[k, ni, j] - sides[k, 0, j]
-                turn[k, j] = way - (old[k, ni, j] - old[k, 0, j])
-            square = turn[0, j] * turn[0, j] + turn[1, j] * turn[1, j]
-            motion.reach[j] = most_bend[j] * np.sqrt(square)
+                chord = sides[k, ni, j] - sides[k, 0, j]
+                chord_change[k, j] = chord - (old[k, ni, j] - old[k, 0, j])
+            square = (
+                chord_change[0, j] * chord_change[0, j] + chord_change[1, j] * chord_change[1, j]
+            )
+            motion.reach[j] = most_departure[j] * np.sqrt(square)
 
 
 def displaced_grid(previous: np.ndarray, boundary: np.ndarray) -> np.ndarray:
@@ -315,9 +339,9 @@ def fill_curves(sides, share_i, share_j, curve):
                 v = j / nj
                 along = (1.0 - v) * low[0, i] + v * high[0, i]
                 across = (1.0 - v) * low[1, i] + v * high[1, i]
-                way_x, way_y = x[ni, j] - x[0, j], y[ni, j] - y[0, j]
-                curve[0, i, j] += share_i * (x[0, j] + (along * way_x - across * way_y))
-                curve[1, i, j] += share_i * (y[0, j] + (along * way_y + across * way_x))
+                chord_x, chord_y = x[ni, j] - x[0, j], y[ni, j] - y[0, j]
+                curve[0, i, j] += share_i * (x[0, j] + (along * chord_x - across * chord_y))
+                curve[1, i, j] += share_i * (y[0, j] + (along * chord_y + across * chord_x))
     # lines i = const likewise
     if share_j > 0.0:
         low, high = np.empty((2, nj + 1)), np.empty((2, nj + 1))
@@ -325,38 +349,39 @@ def fill_curves(sides, share_i, share_j, curve):
         fill_shape(x[ni], y[ni], high)
         for i in range(ni + 1):
             u = i / ni
-            way_x, way_y = x[i, nj] - x[i, 0], y[i, nj] - y[i, 0]
+            chord_x, chord_y = x[i, nj] - x[i, 0], y[i, nj] - y[i, 0]
             for j in range(nj + 1):
                 along = (1.0 - u) * low[0, j] + u * high[0, j]
                 across = (1.0 - u) * low[1, j] + u * high[1, j]
-                curve[0, i, j] += share_j * (x[i, 0] + (along * way_x - across * way_y))
-                curve[1, i, j] += share_j * (y[i, 0] + (along * way_y + across * way_x))
+                curve[0, i, j] += share_j * (x[i, 0] + (along * chord_x - across * chord_y))
+                curve[1, i, j] += share_j * (y[i, 0] + (along * chord_y + across * chord_x))
 
 
 @kernel(allocates=False)
-def take_curve(curve, i, low, count, to_x, to_y, Z):
-    """The edges along i of `curve` that lead to its row i, into `Z` from `to_x`, `to_y` on [m].
+def load_curve_edges(curve, i, low, count, row_x, row_y, Z):
+    """Load the edges along i of `curve` that lead to its row i [m] into two rows of `Z`.
 
     Of `count` columns from `low` on.
     """
     x0, y0 = curve[0, i - 1, low : low + count], curve[1, i - 1, low : low + count]
     x1, y1 = curve[0, i, low : low + count], curve[1, i, low : low + count]
     for col in range(count):
-        Z[to_x + col] = x1[col] - x0[col]
-        Z[to_y + col] = y1[col] - y0[col]
+        Z[row_x + col] = x1[col] - x0[col]
+        Z[row_y + col] = y1[col] - y0[col]
 
 
 @kernel(allocates=False)
-def take_curve_sides(curve, i, low, cells, weight, from_x, from_y, Z):
-    """Take the edges along j of row i of `curve`, times those weights, from two rows of `Z`.
+def subtract_curve_sides(curve, i, low, cells, rows, Z):
+    """Subtract the edges along j of row i of `curve`, weighted, from two rows of `Z`.
 
-    The weights lie in `Z` from `weight` on, the rows from `from_x`, `from_y` on.
+    `rows`: where the row of the weights and those of x and y begin.
     """
+    weight_row, row_x, row_y = rows
     x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
     for col in range(cells):
-        q = Z[weight + col]
-        Z[from_x + col] -= q * (x[col + 1] - x[col])
-        Z[from_y + col] -= q * (y[col + 1] - y[col])
+        q = Z[weight_row + col]
+        Z[row_x + col] -= q * (x[col + 1] - x[col])
+        Z[row_y + col] -= q * (y[col + 1] - y[col])
 
 
 class AlgebraicRegridder:

@@ -30,7 +30,7 @@ class Turn(NamedTuple):
 
     @property
     def mirrors(self) -> bool:
-        """Does it change the way round?"""
+        """Whether it turns a block that goes anticlockwise into one that goes clockwise."""
         return self.i != self.j
 
     def exchange(self) -> Turn:
@@ -45,9 +45,12 @@ class Turn(NamedTuple):
 TURNS = (Turn(False, False), Turn(True, False), Turn(False, True), Turn(True, True))
 
 
-def turn_bend(turn: Turn, bend: np.ndarray) -> np.ndarray:
-    """Departures (ni+1, nj+1) of the lines' spacing (`find_bend`), counted from the turned ends."""
-    turned = turn.apply(bend)
+def turn_departure(turn: Turn, spacing_departure: np.ndarray) -> np.ndarray:
+    """Departures (ni+1, nj+1) of the lines' spacing, counted from the turned ends.
+
+    They are those of `regrid.barrier.workspace.find_spacing_departure`.
+    """
+    turned = turn.apply(spacing_departure)
     return np.ascontiguousarray(-turned if turn.i else turned)
 
 
@@ -62,42 +65,45 @@ class Symmetry(NamedTuple):
     def even_out(self, change: np.ndarray) -> bool:
         """Leave the symmetric part of displacements (2, ni+1, nj+1), in place.
 
-        False, and bitwise the same displacements, where the rest is rounding.
+        False, and bitwise the same displacements, where all else is rounding.
         """
-        given = change[0] + 1j * change[1]
-        total = given.copy()
+        before = change[0] + 1j * change[1]
+        mean = before.copy()
         for turn, rotation in zip(self.turns, self.rotations, strict=True):
-            image = turn.apply(given)
-            total += rotation * (np.conj(image) if turn.mirrors else image)
-        total /= 1 + len(self.turns)
-        if not np.abs(total - given).max() > self.rounding:
+            image = turn.apply(before)
+            mean += rotation * (np.conj(image) if turn.mirrors else image)
+        mean /= 1 + len(self.turns)
+        if not np.abs(mean - before).max() > self.rounding:
             return False
-        change[0] = total.real
-        change[1] = total.imag
+        change[0] = mean.real
+        change[1] = mean.imag
         return True
 
 
 def find_symmetry(
     previous: np.ndarray,
     displaced: np.ndarray,
-    cells: Sequence[np.ndarray] = (),
-    bend: np.ndarray | None = None,
+    cell_values: Sequence[np.ndarray] = (),
+    spacing_departure: np.ndarray | None = None,
 ) -> Symmetry | None:
     """How a block agrees with itself up to rounding, before and after its motion.
 
-    `previous`, `displaced`: (2, ni+1, nj+1); `cells`: values (ni, nj) of its cells; `bend`
-    (ni+1, nj+1): the spacing of its lines, if they have their own (`find_bend`).  The lengths along
-    the sides are compared first: most blocks end there.
+    `previous`, `displaced`: (2, ni+1, nj+1); `cell_values`: values (ni, nj) of its cells;
+    `spacing_departure` (ni+1, nj+1): that of its lines, if they have their own spacing.  The
+    lengths along the sides are compared first: most blocks end there.
     """
+    departure = spacing_departure
     sides = [_find_side_lengths(grid) for grid in (previous, displaced)]
     turns = []
     for turn in TURNS[1:]:
-        if not all(_agree(turn, lengths, mean) for parts, mean in sides for lengths in parts):
+        if not all(_agree(turn, lengths, mean) for pair, mean in sides for lengths in pair):
             continue
-        if not all(_agree(turn, values, np.abs(values).max()) for values in cells):
+        if not all(_agree(turn, values, np.abs(values).max()) for values in cell_values):
             continue
-        if bend is not None and np.abs(turn_bend(turn, bend) - bend).max() > SYMMETRIC_LENGTH:
-            continue
+        if departure is not None:
+            change = turn_departure(turn, departure) - departure
+            if np.abs(change).max() > SYMMETRIC_LENGTH:
+                continue
         if all(is_even(grid, (turn,), SYMMETRIC_LENGTH) for grid in (previous, displaced)):
             turns.append(turn)
     if not turns:
@@ -116,20 +122,20 @@ def even_out_grid(nodes: np.ndarray, axes: np.ndarray, turns: Sequence[Turn]) ->
     place = axes[0] + 1j * axes[1]
     centre = place.mean()
     place -= centre
-    given = nodes[0] + 1j * nodes[1] - centre
-    total = given.copy()
+    moved = nodes[0] + 1j * nodes[1] - centre
+    total = moved.copy()
     for turn in turns:
-        image = turn.apply(given)
+        image = turn.apply(moved)
         total += _find_rotation(turn, place) * (np.conj(image) if turn.mirrors else image)
-    total = total / (1 + len(turns)) + centre
-    return np.array((total.real, total.imag))
+    mean = total / (1 + len(turns)) + centre
+    return np.array((mean.real, mean.imag))
 
 
 def is_even(nodes: np.ndarray, turns: Sequence[Turn], most: float) -> bool:
-    """Does a grid (2, ni+1, nj+1) agree with those that `turns` make of it, up to `most` of the
-    mean length?"""
-    away = np.abs(even_out_grid(nodes, nodes, turns) - nodes).max()
-    return bool(away <= most * find_mean_length(nodes))
+    """Whether a grid (2, ni+1, nj+1) agrees with those that `turns` make of it, up to `most` of the
+    mean length."""
+    difference = np.abs(even_out_grid(nodes, nodes, turns) - nodes).max()
+    return bool(difference <= most * find_mean_length(nodes))
 
 
 def find_mean_length(nodes: np.ndarray) -> float:
@@ -146,12 +152,12 @@ def _find_side_lengths(nodes: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray]
 
 
 def _agree(turn: Turn, values: np.ndarray, scale: float) -> bool:
-    """Do values (n, m) agree with their turned ones?"""
+    """Whether values (n, m) agree with their turned ones."""
     return bool(np.abs(turn.apply(values) - values).max() <= SYMMETRIC_LENGTH * scale)
 
 
 def _find_rotation(turn: Turn, place: np.ndarray) -> complex:
-    """What brings the turned places (ni+1, nj+1) round their mean, complex, to the places."""
+    """The rotation that brings the turned places (ni+1, nj+1), complex, back to the places."""
     turned = turn.apply(place)
     rotation = np.vdot(np.conj(turned) if turn.mirrors else turned, place)
     return complex(rotation / abs(rotation))

@@ -44,15 +44,15 @@ import numpy as np
 
 from shockgrid.regrid.algebraic import displaced_grid
 from shockgrid.regrid.barrier import assembly as at
-from shockgrid.regrid.barrier.functional import corner_blocks, prepare_corners
+from shockgrid.regrid.barrier.functional import WITHOUT_AREA_TERM, corner_terms, prepare_corners
 from shockgrid.regrid.barrier.regridder import SERIAL_NODES, BarrierRegridder
-from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE
-from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, shorten_steps
+from shockgrid.regrid.barrier.side_inputs import LENGTH, LENGTH_CHANGE
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, NO_LIMIT, shorten_steps
 from shockgrid.regrid.barrier.tuning import Tuning
 from shockgrid.regrid.barrier.workspace import Workspace
 from shockgrid.regrid.equidistribution.weights import WeightedRegridder, compute_side_density
 from shockgrid.regrid.errors import BadInput, RegridFailure
-from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.jit import inlined, kernel
 from shockgrid.regrid.measure.corners import BLOCK_CORNERS, find_excluded_corners, is_collapsed
 from shockgrid.regrid.measure.faults import check_grids, name_cells
 from shockgrid.regrid.measure.quality import compute_corner_areas
@@ -60,61 +60,82 @@ from shockgrid.regrid.protocol import RegridReport, RegridResult
 from shockgrid.regrid.sides import compute_area, copy_sides
 
 # Rows of the energy's scratch: edges along i, then along j at the near and the far row of nodes.
-EDGE_I_X, EDGE_I_Y, NEAR_X, NEAR_Y, FAR_X = range(5)
+LINE_EDGE_X, LINE_EDGE_Y, NEAR_EDGE_X, NEAR_EDGE_Y, FAR_EDGE_X = range(5)
 AREA_ROWS = at.COSECANT_1  # of the assembly's scratch, which holds D here, corner by corner
 
 
 @kernel
-def fill_variational_corner(A, B, area, active, volume, smoothness, orthogonality, out):
-    """Terms of one corner of a row of cells from its edges A along i and B along j.
+def fill_variational_corner(a_rows, b_rows, area, active, volume, smoothness, orthogonality, out):
+    """Terms of one corner of a row of cells from its edges a along i and b along j.
 
     volume: lam_v w sigma/(4 c²) of the cells; the other two weights are numbers.  A corner that is
     not `active` has none.
     """
     for col in range(volume.shape[0]):
-        ax = A[col]
-        ay = A[CHUNK_SPAN + col]
-        ga = A[3 * CHUNK_SPAN + col]
-        bx = B[col]
-        by = B[CHUNK_SPAN + col]
-        gb = B[3 * CHUNK_SPAN + col]
+        ax, ay, _, inverse_a = at.take_block(a_rows, 0, col)
+        bx, by, _, inverse_b = at.take_block(b_rows, 0, col)
         # smoothness: as the barrier's corner (R2.2)
-        keep = active[col]
-        d = keep * area[col] + (1.0 - keep)
+        kept = active[col]
+        d = kept * area[col] + (1.0 - kept)
         wx, wy = ax - by, ay + bx
         v = ((wx, wy), (wy, -wx))
         g = ((by, -bx), (-ay, ax))
-        scale = keep * smoothness, ga, gb
-        terms = corner_blocks(wx * wx + wy * wy, v, g, 1.0, 1.0 / d, 1.0, scale, (0.0, 0.0))
-        gax, gay, gbx, gby, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy = terms[:10]
-        ab_xx, ab_xy, ab_yx, ab_yy = terms[10:]
-        # volume (D²) and orthogonality (a·b): gradients (R12.2)
-        kappa = 2.0 * keep * volume[col]
-        mu = 2.0 * keep * orthogonality
+        scale = kept * smoothness, inverse_a, inverse_b
+        size = wx * wx + wy * wy
+        terms = corner_terms(size, v, g, 1.0, 1.0 / d, 1.0, scale, WITHOUT_AREA_TERM)
+        # volume (D²) and orthogonality (a·b): slopes (R12.2)
+        kappa = 2.0 * kept * volume[col]
+        mu = 2.0 * kept * orthogonality
         dot = ax * bx + ay * by
-        kd = kappa * d
-        md = mu * dot
-        out[at.GRAD_AX + col] = gax + ga * (kd * by + md * bx)
-        out[at.GRAD_AY + col] = gay + ga * (md * by - kd * bx)
-        out[at.GRAD_BX + col] = gbx + gb * (md * ax - kd * ay)
-        out[at.GRAD_BY + col] = gby + gb * (kd * ax + md * ay)
+        kappa_d = kappa * d
+        mu_dot = mu * dot
+        out[at.SLOPE_AX + col] = terms.slope_ax + inverse_a * (kappa_d * by + mu_dot * bx)
+        out[at.SLOPE_AY + col] = terms.slope_ay + inverse_a * (mu_dot * by - kappa_d * bx)
+        out[at.SLOPE_BX + col] = terms.slope_bx + inverse_b * (mu_dot * ax - kappa_d * ay)
+        out[at.SLOPE_BY + col] = terms.slope_by + inverse_b * (kappa_d * ax + mu_dot * ay)
         # and second derivatives
-        kaa = kappa * ga * ga
-        maa = mu * ga * ga
-        kab = kappa * ga * gb
-        mab = mu * ga * gb
-        kbb = kappa * gb * gb
-        mbb = mu * gb * gb
-        out[at.AA_XX + col] = aa_xx + (kaa * by * by + maa * bx * bx)
-        out[at.AA_XY + col] = aa_xy + (maa - kaa) * bx * by
-        out[at.AA_YY + col] = aa_yy + (kaa * bx * bx + maa * by * by)
-        out[at.BB_XX + col] = bb_xx + (kbb * ay * ay + mbb * ax * ax)
-        out[at.BB_XY + col] = bb_xy + (mbb - kbb) * ax * ay
-        out[at.BB_YY + col] = bb_yy + (kbb * ax * ax + mbb * ay * ay)
-        out[at.AB_XX + col] = ab_xx + (mab * bx * ax - kab * by * ay)
-        out[at.AB_XY + col] = ab_xy + (mab * bx * ay + kab * by * ax)
-        out[at.AB_YX + col] = ab_yx + (mab * by * ax + kab * bx * ay)
-        out[at.AB_YY + col] = ab_yy + (mab * by * ay - kab * bx * ax)
+        hessian = terms.hessian
+        kappa_aa = kappa * inverse_a * inverse_a
+        mu_aa = mu * inverse_a * inverse_a
+        kappa_ab = kappa * inverse_a * inverse_b
+        mu_ab = mu * inverse_a * inverse_b
+        kappa_bb = kappa * inverse_b * inverse_b
+        mu_bb = mu * inverse_b * inverse_b
+        out[at.AA_XX + col] = hessian.aa_xx + (kappa_aa * by * by + mu_aa * bx * bx)
+        out[at.AA_XY + col] = hessian.aa_xy + (mu_aa - kappa_aa) * bx * by
+        out[at.AA_YY + col] = hessian.aa_yy + (kappa_aa * bx * bx + mu_aa * by * by)
+        out[at.BB_XX + col] = hessian.bb_xx + (kappa_bb * ay * ay + mu_bb * ax * ax)
+        out[at.BB_XY + col] = hessian.bb_xy + (mu_bb - kappa_bb) * ax * ay
+        out[at.BB_YY + col] = hessian.bb_yy + (kappa_bb * ax * ax + mu_bb * ay * ay)
+        out[at.AB_XX + col] = hessian.ab_xx + (mu_ab * bx * ax - kappa_ab * by * ay)
+        out[at.AB_XY + col] = hessian.ab_xy + (mu_ab * bx * ay + kappa_ab * by * ax)
+        out[at.AB_YX + col] = hessian.ab_yx + (mu_ab * by * ax + kappa_ab * bx * ay)
+        out[at.AB_YY + col] = hessian.ab_yy + (mu_ab * by * ay - kappa_ab * bx * ax)
+
+
+@inlined
+def fill_variational_corners(active, smoothness, orthogonality, count, Z):
+    """Terms of the four corners of a row of cells; `active` (4, count)."""
+    for col in range(count):
+        areas, _ = prepare_corners(*at.take_scaled_edges(col, Z))
+        for corner in range(4):
+            Z[AREA_ROWS + corner * CHUNK_SPAN + col] = areas[corner]
+    for corner in range(4):
+        # Corners 2 and 3 take the line edge one column on, 3 and 4 the far edge.
+        shift = 1 if corner == 1 or corner == 2 else 0
+        side = at.FAR_X if corner >= 2 else at.NEAR_X
+        term = at.CORNER_1 + corner * at.CORNER_SPAN
+        area = AREA_ROWS + corner * CHUNK_SPAN
+        fill_variational_corner(
+            Z[at.LINE_X + shift : at.LINE_X + shift + 4 * CHUNK_SPAN],
+            Z[side : side + 4 * CHUNK_SPAN],
+            Z[area : area + count],
+            active[corner],
+            Z[at.WEIGHT : at.WEIGHT + count],
+            smoothness,
+            orthogonality,
+            Z[term : term + at.CORNER_SPAN],
+        )
 
 
 @kernel
@@ -130,43 +151,50 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     ni = nodes.shape[1] - 1
     low = first - 1
     count = last - first + 1
-    bend = np.zeros((ni + 1, nodes.shape[2]))
-    way = np.zeros((2, nodes.shape[2]))
-    laws = at.LineLaws(along_i, along_j, blend_i, bend, way, 0.0, 0.0)
+    no_departure = np.zeros((ni + 1, nodes.shape[2]))
+    no_chords = np.zeros((2, nodes.shape[2]))
+    lines = at.LineInputs(along_i, along_j, blend_i, no_departure, no_chords, 0.0, 0.0)
     at.begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
-        now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
-        past = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
-        at.begin_row(nodes, i, laws, low, count, Z)
-        for col in range(count):
-            corners, _ = prepare_corners(*at.take_scaled_edges(col, Z))
-            for corner in range(4):
-                Z[AREA_ROWS + corner * CHUNK_SPAN + col] = corners[corner]
+        here = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
+        before = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
+        # corners of this row of cells
+        at.begin_row(nodes, i, lines, low, count, Z)
         for col in range(count):
             Z[at.WEIGHT + col] = volume[i, low + col]
-        for corner in range(4):
-            # Corners 2 and 3 take the line edge one column on, 3 and 4 the far side edge.
-            shift = 1 if corner == 1 or corner == 2 else 0
-            side = at.CX if corner >= 2 else at.BX
-            term = at.CORNER_TERM_ROWS + corner * 14 * CHUNK_SPAN
-            area = AREA_ROWS + corner * CHUNK_SPAN
-            fill_variational_corner(
-                Z[at.AX + shift : at.AX + shift + 4 * CHUNK_SPAN],
-                Z[side : side + 4 * CHUNK_SPAN],
-                Z[area : area + count],
-                active[corner, i, low : low + count],
-                Z[at.WEIGHT : at.WEIGHT + count],
-                smoothness,
-                orthogonality,
-                Z[term : term + 14 * CHUNK_SPAN],
-            )
-        at.fill_cell_blocks(count, now, Z)
-        at.fill_line_blocks(count, now, Z)
+        row_active = active[:, i, low : low + count]
+        fill_variational_corners(row_active, smoothness, orthogonality, count, Z)
+        # gathered by cell, then by node
+        at.fill_cell_blocks(count, here, Z)
+        at.fill_line_blocks(count, here, Z)
         if i > 0:
-            at.fill_side_blocks(count, now, Z)
+            at.fill_near_blocks(count, here, Z)
             at.fill_gradient(gradient[0, i, first:last], gradient[1, i, first:last], Z)
-            at.fill_own_blocks(count, now, past, Z)
+            at.fill_own_blocks(count, here, before, Z)
         at.end_row(count, Z)
+
+
+@inlined
+def fill_row_of_edges(nodes, i, sides, Z):
+    """Edges over their lengths: along i in row i of cells, along j in both of its rows of nodes.
+
+    sides: (along_i, along_j, blend_i, blend_j) of a workspace.
+    """
+    along_i, along_j, blend_i, blend_j = sides
+    x, y = nodes[0], nodes[1]
+    nj = x.shape[1] - 1
+    length = along_i[LENGTH, i]
+    change = along_i[LENGTH_CHANGE, i]
+    for j in range(nj + 1):
+        inverse = 1.0 / (length + blend_j[j] * change)
+        Z[LINE_EDGE_X, j] = inverse * (x[i + 1, j] - x[i, j])
+        Z[LINE_EDGE_Y, j] = inverse * (y[i + 1, j] - y[i, j])
+    for row in range(2):
+        blend = blend_i[i + row]
+        for j in range(nj):
+            inverse = 1.0 / (along_j[LENGTH, j] + blend * along_j[LENGTH_CHANGE, j])
+            Z[NEAR_EDGE_X + 2 * row, j] = inverse * (x[i + row, j + 1] - x[i + row, j])
+            Z[NEAR_EDGE_Y + 2 * row, j] = inverse * (y[i + row, j + 1] - y[i + row, j])
 
 
 @kernel
@@ -176,40 +204,26 @@ def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     sides, cells: as above.  Z is scratch (6, nj + 1).  Where a node is not a number J says so, the
     least D may not.
     """
-    along_i, along_j, blend_i, blend_j = sides
     volume, active, smoothness, orthogonality = cells
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    x, y = nodes[0], nodes[1]
     for i in range(ni):
-        length = along_i[LENGTH, i]
-        change = along_i[LENGTH_CHANGE, i]
-        # scaled edges along i of this row of cells, then both of its lines along j
-        for j in range(nj + 1):
-            g = 1.0 / (length + blend_j[j] * change)
-            Z[EDGE_I_X, j] = g * (x[i + 1, j] - x[i, j])
-            Z[EDGE_I_Y, j] = g * (y[i + 1, j] - y[i, j])
-        for row in range(2):
-            way = blend_i[i + row]
-            for j in range(nj):
-                g = 1.0 / (along_j[LENGTH, j] + way * along_j[LENGTH_CHANGE, j])
-                Z[NEAR_X + 2 * row, j] = g * (x[i + row, j + 1] - x[i + row, j])
-                Z[NEAR_Y + 2 * row, j] = g * (y[i + row, j + 1] - y[i + row, j])
+        fill_row_of_edges(nodes, i, sides, Z)
         # terms of the four corners of each cell (R12.2)
         total = 0.0
-        smallest = 1e300
+        smallest = NO_LIMIT
         for corner in range(4):
             shift = 1 if corner == 1 or corner == 2 else 0
-            side = FAR_X if corner >= 2 else NEAR_X
+            side = FAR_EDGE_X if corner >= 2 else NEAR_EDGE_X
             for j in range(nj):
-                ax, ay = Z[EDGE_I_X, j + shift], Z[EDGE_I_Y, j + shift]
+                ax, ay = Z[LINE_EDGE_X, j + shift], Z[LINE_EDGE_Y, j + shift]
                 bx, by = Z[side, j], Z[side + 1, j]
-                keep = active[corner, i, j]
-                d = keep * (ax * by - ay * bx) + (1.0 - keep)
+                kept = active[corner, i, j]
+                d = kept * (ax * by - ay * bx) + (1.0 - kept)
                 dot = ax * bx + ay * by
-                term = smoothness * (ax * ax + ay * ay + bx * bx + by * by) / d
-                total += keep * (term + volume[i, j] * d * d + orthogonality * dot * dot)
-                bound = d if keep > 0.0 else 1e300
-                smallest = smallest if smallest < bound else bound
+                smooth_term = smoothness * (ax * ax + ay * ay + bx * bx + by * by) / d
+                total += kept * (smooth_term + volume[i, j] * d * d + orthogonality * dot * dot)
+                active_area = d if kept > 0.0 else NO_LIMIT
+                smallest = smallest if smallest < active_area else active_area
         energy[i] = total
         least[i] = smallest
 

@@ -20,11 +20,11 @@ from __future__ import annotations
 import numpy as np
 
 from shockgrid.regrid.barrier import functional
-from shockgrid.regrid.barrier.line_cg import make_solver
-from shockgrid.regrid.barrier.side_laws import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
+from shockgrid.regrid.barrier.assembly import invert_pivot, transpose_block
+from shockgrid.regrid.barrier.line_cg import add_neighbour, make_solver, multiply_block
+from shockgrid.regrid.barrier.side_inputs import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
-LEAST_PIVOT = 1e-14  # least determinant of a pivot, relative to the product of its diagonal
 # Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j
 # (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
 # (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
@@ -47,64 +47,80 @@ COARSE_SCRATCH_ROWS = 26
 
 
 @inlined
-def take_mean(f, i, i_last, j, j_last):
-    """Mean of an array at (i, j), (i_last, j), (i, j_last), (i_last, j_last), maybe equal."""
-    return 0.25 * ((f[i, j] + f[i_last, j_last]) + (f[i, j_last] + f[i_last, j]))
+def take_mean(values, i, last_i, j, last_j):
+    """Mean of `values` at (i, j), (last_i, j), (i, last_j), (last_i, last_j), maybe equal."""
+    diagonal = values[i, j] + values[last_i, last_j]
+    return 0.25 * (diagonal + (values[i, last_j] + values[last_i, j]))
+
+
+@inlined
+def take_mean_pair(values, k, last_k):
+    """Mean of `values` at k and last_k, maybe equal."""
+    return 0.5 * (values[k] + values[last_k])
+
+
+@inlined
+def store_mean_edges(nodes, rows, j, last_j, k, Z):
+    """Store the edges of gathered cell k, without scaling: the means of one, two or four cells.
+
+    `rows`: first and last row of the cells; `j` and `last_j`: their first and last column.
+    """
+    first, last = rows
+    x, y = nodes
+    x1, y1 = take_mean(x, first, last, j, last_j), take_mean(y, first, last, j, last_j)
+    x2 = take_mean(x, first, last, j + 1, last_j + 1)
+    y2 = take_mean(y, first, last, j + 1, last_j + 1)
+    x3 = take_mean(x, first + 1, last + 1, j + 1, last_j + 1)
+    y3 = take_mean(y, first + 1, last + 1, j + 1, last_j + 1)
+    x4 = take_mean(x, first + 1, last + 1, j, last_j)
+    y4 = take_mean(y, first + 1, last + 1, j, last_j)
+    Z[LOW_X, k] = x4 - x1
+    Z[LOW_Y, k] = y4 - y1
+    Z[UP_X, k] = x3 - x2
+    Z[UP_Y, k] = y3 - y2
+    Z[NEAR_X, k] = x2 - x1
+    Z[NEAR_Y, k] = y2 - y1
+    Z[FAR_X, k] = x3 - x4
+    Z[FAR_Y, k] = y3 - y4
 
 
 @kernel
-def gather_cells(nodes, law, first, last, first_columns, last_columns, Z):
+def gather_cells(nodes, inputs, first, last, first_columns, last_columns, Z):
     """Gather the fine cells at centres of coarse ones in `Z`: unscaled edges, lengths, weights.
 
     They are (first, first_columns) to (last, last_columns), one or two in a direction, whose nodes
     and lengths are averaged.
     """
-    x, y = nodes
-    along_i, along_j = law.along_i, law.along_j
+    along_i, along_j = inputs.along_i, inputs.along_j
     ni, nj = along_i.shape[1], along_j.shape[1]
     # lengths and steps of the row of cells
-    low = 0.5 * (along_i[LENGTH, first] + along_i[LENGTH, last])
-    low_change = 0.5 * (along_i[LENGTH_CHANGE, first] + along_i[LENGTH_CHANGE, last])
-    step = 0.5 * (along_i[STEP, first] + along_i[STEP, last])
-    step_change = 0.5 * (along_i[STEP_CHANGE, first] + along_i[STEP_CHANGE, last])
-    near_blend = 0.5 * (law.blend_i[first] + law.blend_i[last])
-    far_blend = 0.5 * (law.blend_i[first + 1] + law.blend_i[last + 1])
+    line_length = take_mean_pair(along_i[LENGTH], first, last)
+    line_length_change = take_mean_pair(along_i[LENGTH_CHANGE], first, last)
+    line_step = take_mean_pair(along_i[STEP], first, last)
+    line_step_change = take_mean_pair(along_i[STEP_CHANGE], first, last)
+    near_blend = take_mean_pair(inputs.blend_i, first, last)
+    far_blend = take_mean_pair(inputs.blend_i, first + 1, last + 1)
     u = 0.5 * (first + last + 1) / ni
     for k in range(first_columns.shape[0]):
         j = first_columns[k]
-        j_last = last_columns[k]
-        # corners of the gathered cell, and its edges
-        x1, y1 = take_mean(x, first, last, j, j_last), take_mean(y, first, last, j, j_last)
-        x2 = take_mean(x, first, last, j + 1, j_last + 1)
-        y2 = take_mean(y, first, last, j + 1, j_last + 1)
-        x3 = take_mean(x, first + 1, last + 1, j + 1, j_last + 1)
-        y3 = take_mean(y, first + 1, last + 1, j + 1, j_last + 1)
-        x4 = take_mean(x, first + 1, last + 1, j, j_last)
-        y4 = take_mean(y, first + 1, last + 1, j, j_last)
-        Z[LOW_X, k] = x4 - x1
-        Z[LOW_Y, k] = y4 - y1
-        Z[UP_X, k] = x3 - x2
-        Z[UP_Y, k] = y3 - y2
-        Z[NEAR_X, k] = x2 - x1
-        Z[NEAR_Y, k] = y2 - y1
-        Z[FAR_X, k] = x3 - x4
-        Z[FAR_Y, k] = y3 - y4
+        last_j = last_columns[k]
+        store_mean_edges(nodes, (first, last), j, last_j, k, Z)
         # inverse conditional lengths of its edges (R2.3)
-        low_blend = 0.5 * (law.blend_j[j] + law.blend_j[j_last])
-        up_blend = 0.5 * (law.blend_j[j + 1] + law.blend_j[j_last + 1])
-        Z[LOW_G, k] = 1.0 / (low + low_blend * low_change)
-        Z[UP_G, k] = 1.0 / (low + up_blend * low_change)
-        near = 0.5 * (along_j[LENGTH, j] + along_j[LENGTH, j_last])
-        change = 0.5 * (along_j[LENGTH_CHANGE, j] + along_j[LENGTH_CHANGE, j_last])
-        Z[NEAR_G, k] = 1.0 / (near + near_blend * change)
-        Z[FAR_G, k] = 1.0 / (near + far_blend * change)
+        low_blend = take_mean_pair(inputs.blend_j, j, last_j)
+        up_blend = take_mean_pair(inputs.blend_j, j + 1, last_j + 1)
+        Z[LOW_G, k] = 1.0 / (line_length + low_blend * line_length_change)
+        Z[UP_G, k] = 1.0 / (line_length + up_blend * line_length_change)
+        side_length = take_mean_pair(along_j[LENGTH], j, last_j)
+        side_length_change = take_mean_pair(along_j[LENGTH_CHANGE], j, last_j)
+        Z[NEAR_G, k] = 1.0 / (side_length + near_blend * side_length_change)
+        Z[FAR_G, k] = 1.0 / (side_length + far_blend * side_length_change)
         # weights of the straight lines
-        side = 0.5 * (along_j[STEP, j] + along_j[STEP, j_last])
-        change = 0.5 * (along_j[STEP_CHANGE, j] + along_j[STEP_CHANGE, j_last])
-        v = 0.5 * (j + j_last + 1) / nj
-        Z[LINE_Q, k] = law.ki / (step + v * step_change)
-        Z[SIDE_Q, k] = law.kj / (side + u * change)
-        Z[SOUND, k] = take_mean(law.sound, first, last, j, j_last)
+        side_step = take_mean_pair(along_j[STEP], j, last_j)
+        side_step_change = take_mean_pair(along_j[STEP_CHANGE], j, last_j)
+        v = 0.5 * (j + last_j + 1) / nj
+        Z[LINE_Q, k] = inputs.ki / (line_step + v * line_step_change)
+        Z[SIDE_Q, k] = inputs.kj / (side_step + u * side_step_change)
+        Z[SOUND, k] = take_mean(inputs.sound, first, last, j, last_j)
 
 
 @inlined
@@ -117,59 +133,57 @@ def take_gathered_edges(k, Z):
 
 
 @kernel
-def weigh_cells(law, growth, count, Z):
+def weigh_cells(inputs, growth, count, Z):
     """Weight of a corner of the gathered cells (theory R4.3, R4.4); False if one is folded."""
-    full = functional.take_corner_weight(law)
+    full = functional.take_corner_weight(inputs)
     folded = 0
     for k in range(count):
         low, up, near, far = take_gathered_edges(k, Z)
-        corners, squares = functional.prepare_corners(
+        areas, squares = functional.prepare_corners(
             functional.measure_edge(low), functional.measure_edge(up),
             functional.measure_edge(near), functional.measure_edge(far),
         )  # fmt: skip
-        d1, d2, d3, d4 = corners
+        d1, d2, d3, d4 = areas
         folded += 0 if functional.find_least(d1, d2, d3, d4) > 0.0 else 1
         inverses = 1.0 / d1, 1.0 / d2, 1.0 / d3, 1.0 / d4
         m1, m2, m3, m4 = functional.find_square_cosecants(squares, inverses)
         square = functional.find_largest(m1, m2, m3, m4)
-        ratio = (Z[LOW_G, k] + Z[UP_G, k]) / (Z[NEAR_G, k] + Z[FAR_G, k])
-        strength = functional.weigh(square, law.least_sine, law.strengthening)
-        Z[WEIGHT, k] = full * strength * functional.fade(ratio, growth)
+        length_ratio = (Z[LOW_G, k] + Z[UP_G, k]) / (Z[NEAR_G, k] + Z[FAR_G, k])
+        strength = functional.compute_barrier_strength(
+            square, inputs.least_sine, inputs.strengthening
+        )
+        Z[WEIGHT, k] = full * strength * functional.fade(length_ratio, growth)
     return folded == 0
 
 
 @kernel
-def add_corners(near, far, a_g, b_g, law, count, Z):
+def add_corners(a_row, b_row, a_g, b_g, inputs, count, Z):
     """Add the blocks aa, ab, bb of one corner of the gathered cells to T (theory R4.7).
 
-    `near` and `far` are the rows of its edges along i and j, `a_g` and `b_g` those of their inverse
-    lengths; D is positive.
+    `a_row` and `b_row` are the rows of its edges along i and j, `a_g` and `b_g` those of their
+    inverse lengths; D is positive.
     """
-    lam_c, _ = functional.take_area_numbers(law)
+    numbers = functional.take_corner_numbers(inputs)
     for k in range(count):
-        ga = Z[a_g, k]
-        gb = Z[b_g, k]
-        ax = ga * Z[near, k]
-        ay = ga * Z[near + 1, k]
-        bx = gb * Z[far, k]
-        by = gb * Z[far + 1, k]
+        inverse_a = Z[a_g, k]
+        inverse_b = Z[b_g, k]
+        ax, ay = inverse_a * Z[a_row, k], inverse_a * Z[a_row + 1, k]
+        bx, by = inverse_b * Z[b_row, k], inverse_b * Z[b_row + 1, k]
         inverse = 1.0 / (ax * by - ay * bx)
-        _, _, _, _, aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy = (
-            functional.barrier_corner(
-                (ax, ay, 0.0, ga), (bx, by, 0.0, gb), inverse, 1.0, Z[WEIGHT, k], (lam_c, 0.0)
-            )
-        )
-        add_blocks(k, (aa_xx, aa_xy, aa_yy, bb_xx, bb_xy, bb_yy, ab_xx, ab_xy, ab_yx, ab_yy), Z)
+        a = (ax, ay, 0.0, inverse_a)
+        b = (bx, by, 0.0, inverse_b)
+        terms = functional.barrier_corner(a, b, inverse, 1.0, Z[WEIGHT, k], numbers)
+        add_hessian(k, terms.hessian, Z)
 
 
 @inlined
-def add_blocks(k, blocks, Z):
-    """Add blocks AA, BB and AB to T."""
+def add_hessian(k, hessian, Z):
+    """Add a `regrid.barrier.functional.Hessian` to T."""
     for row in range(3):
-        Z[BLOCK_AA + row, k] += blocks[row]
-        Z[BLOCK_BB + row, k] += blocks[3 + row]
+        Z[BLOCK_AA + row, k] += hessian[row]
+        Z[BLOCK_BB + row, k] += hessian[3 + row]
     for row in range(4):
-        Z[BLOCK_AB + row, k] += blocks[6 + row]
+        Z[BLOCK_AB + row, k] += hessian[6 + row]
 
 
 @kernel
@@ -179,84 +193,104 @@ def add_cell_terms(numbers, count, Z):
         low, up, near, far = take_gathered_edges(k, Z)
         a, b = functional.find_mid_lines(low, up, near, far)
         if functional.is_active(a, b, Z[SOUND, k], numbers):
-            _, _, parts = functional.cell_slope(a, b, Z[SOUND, k], numbers)
-            add_blocks(k, functional.cell_blocks(a, b, parts), Z)
+            slope = functional.cell_slope(a, b, Z[SOUND, k], numbers)
+            add_hessian(k, functional.cell_blocks(a, b, slope), Z)
+
+
+@inlined
+def add_block(rows, start, k, block):
+    """Add a 2 × 2 block (xx, xy, yx, yy) to four rows of the matrix from `start` on."""
+    rows[start, k] += block[0]
+    rows[start + 1, k] += block[1]
+    rows[start + 2, k] += block[2]
+    rows[start + 3, k] += block[3]
+
+
+@inlined
+def add_symmetric(rows, start, k, first, second):
+    """Add the sum of two symmetric blocks (xx, xy, yy) to three rows of the matrix."""
+    rows[start, k] += first[0] + second[0]
+    rows[start + 1, k] += first[1] + second[1]
+    rows[start + 2, k] += first[2] + second[2]
+
+
+@inlined
+def subtract_symmetric(rows, start, k, first, second):
+    """Add the difference of two symmetric blocks (xx, xy, yy) to three rows of the matrix."""
+    rows[start, k] += first[0] - second[0]
+    rows[start + 1, k] += first[1] - second[1]
+    rows[start + 2, k] += first[2] - second[2]
+
+
+@inlined
+def take_symmetric(rows, start, k):
+    """The symmetric block (xx, xy, yy) in three rows from `start` on."""
+    return rows[start, k], rows[start + 1, k], rows[start + 2, k]
+
+
+@inlined
+def take_block(rows, start, k):
+    """The block (xx, xy, yx, yy) in four rows from `start` on."""
+    return rows[start, k], rows[start + 1, k], rows[start + 2, k], rows[start + 3, k]
 
 
 @kernel
-def couple_nodes(stretch, lines, count, Z, now, then):
+def couple_nodes(stretch, lines, count, Z, here, after):
     """Add a row of coarse cells to the rows of matrix blocks of the nodes on either side of it.
 
-    `stretch` and `lines` (count) are the numbers of fine cells of a coarse one along i and j; `now`
-    and `then` (ROWS, count + 1) are the blocks at its first and second row of coarse nodes.
+    `stretch` and `lines` (count) are the numbers of fine cells of a coarse one along i and j;
+    `here` and `after` (COARSE_ROWS, count + 1) are the blocks at its first and second row of coarse
+    nodes.
     """
     for k in range(count):
         # blocks of the four corners together, stretched to coarse cells (R4.14)
-        along = 0.5 * lines[k] / stretch
-        aa_xx = along * Z[BLOCK_AA, k]
-        aa_xy = along * Z[BLOCK_AA + 1, k]
-        aa_yy = along * Z[BLOCK_AA + 2, k]
-        along = 0.5 * stretch / lines[k]
-        bb_xx = along * Z[BLOCK_BB, k]
-        bb_xy = along * Z[BLOCK_BB + 1, k]
-        bb_yy = along * Z[BLOCK_BB + 2, k]
+        along_i = 0.5 * lines[k] / stretch
+        aa_xx = along_i * Z[BLOCK_AA, k]
+        aa_xy = along_i * Z[BLOCK_AA + 1, k]
+        aa_yy = along_i * Z[BLOCK_AA + 2, k]
+        along_j = 0.5 * stretch / lines[k]
+        bb_xx = along_j * Z[BLOCK_BB, k]
+        bb_xy = along_j * Z[BLOCK_BB + 1, k]
+        bb_yy = along_j * Z[BLOCK_BB + 2, k]
         odd = 0.25 * (Z[BLOCK_AB + 1, k] - Z[BLOCK_AB + 2, k])
         even = 0.25 * (Z[BLOCK_AB + 1, k] + Z[BLOCK_AB + 2, k])
-        xx = 0.5 * Z[BLOCK_AB, k]
-        yy = 0.5 * Z[BLOCK_AB + 3, k]
+        across = (0.5 * Z[BLOCK_AB, k], even, 0.5 * Z[BLOCK_AB + 3, k])
         # couplings along i, along j and across
-        now[COARSE_EAST, k] -= aa_xx
-        now[COARSE_EAST + 1, k] += odd - aa_xy
-        now[COARSE_EAST + 2, k] -= odd + aa_xy
-        now[COARSE_EAST + 3, k] -= aa_yy
-        now[COARSE_NORTH, k] -= bb_xx
-        now[COARSE_NORTH + 1, k] -= odd + bb_xy
-        now[COARSE_NORTH + 2, k] += odd - bb_xy
-        now[COARSE_NORTH + 3, k] -= bb_yy
-        then[COARSE_NORTH, k] -= bb_xx
-        then[COARSE_NORTH + 1, k] += odd - bb_xy
-        then[COARSE_NORTH + 2, k] -= odd + bb_xy
-        then[COARSE_NORTH + 3, k] -= bb_yy
-        now[COARSE_ACROSS, k] = xx
-        now[COARSE_ACROSS + 1, k] = even
-        now[COARSE_ACROSS + 2, k] = yy
+        add_block(here, COARSE_EAST, k, (-aa_xx, odd - aa_xy, -(odd + aa_xy), -aa_yy))
+        add_block(here, COARSE_NORTH, k, (-bb_xx, -(odd + bb_xy), odd - bb_xy, -bb_yy))
+        add_block(after, COARSE_NORTH, k, (-bb_xx, odd - bb_xy, -(odd + bb_xy), -bb_yy))
+        here[COARSE_ACROSS, k] = across[0]
+        here[COARSE_ACROSS + 1, k] = across[1]
+        here[COARSE_ACROSS + 2, k] = across[2]
+        # at a corner itself: both of its edges, and their coupling
+        both = (aa_xx + bb_xx, aa_xy + bb_xy, aa_yy + bb_yy)
+        add_symmetric(here, COARSE_OWN, k, both, across)
+        subtract_symmetric(after, COARSE_OWN, k, both, across)
+        # kept for the next line of nodes
         Z[BLOCK_AA, k] = aa_xx
         Z[BLOCK_AA + 1, k] = aa_xy
         Z[BLOCK_AA + 2, k] = aa_yy
         Z[BLOCK_AB, k] = odd
-        # at a corner itself: both of its edges, and their coupling
-        Z[BLOCK_BB, k] = aa_xx + bb_xx
-        Z[BLOCK_BB + 1, k] = aa_xy + bb_xy
-        Z[BLOCK_BB + 2, k] = aa_yy + bb_yy
-        now[COARSE_OWN, k] += Z[BLOCK_BB, k] + xx
-        now[COARSE_OWN + 1, k] += Z[BLOCK_BB + 1, k] + even
-        now[COARSE_OWN + 2, k] += Z[BLOCK_BB + 2, k] + yy
-        then[COARSE_OWN, k] += Z[BLOCK_BB, k] - xx
-        then[COARSE_OWN + 1, k] += Z[BLOCK_BB + 1, k] - even
-        then[COARSE_OWN + 2, k] += Z[BLOCK_BB + 2, k] - yy
+        Z[BLOCK_BB, k] = both[0]
+        Z[BLOCK_BB + 1, k] = both[1]
+        Z[BLOCK_BB + 2, k] = both[2]
     # the same towards the next line of nodes
     for k in range(count):
-        now[COARSE_EAST, k + 1] -= Z[BLOCK_AA, k]
-        now[COARSE_EAST + 1, k + 1] -= Z[BLOCK_AB, k] + Z[BLOCK_AA + 1, k]
-        now[COARSE_EAST + 2, k + 1] += Z[BLOCK_AB, k] - Z[BLOCK_AA + 1, k]
-        now[COARSE_EAST + 3, k + 1] -= Z[BLOCK_AA + 2, k]
-        xx = now[COARSE_ACROSS, k]
-        even = now[COARSE_ACROSS + 1, k]
-        yy = now[COARSE_ACROSS + 2, k]
-        now[COARSE_OWN, k + 1] += Z[BLOCK_BB, k] - xx
-        now[COARSE_OWN + 1, k + 1] += Z[BLOCK_BB + 1, k] - even
-        now[COARSE_OWN + 2, k + 1] += Z[BLOCK_BB + 2, k] - yy
-        then[COARSE_OWN, k + 1] += Z[BLOCK_BB, k] + xx
-        then[COARSE_OWN + 1, k + 1] += Z[BLOCK_BB + 1, k] + even
-        then[COARSE_OWN + 2, k + 1] += Z[BLOCK_BB + 2, k] + yy
+        aa_xx, aa_xy, aa_yy = take_symmetric(Z, BLOCK_AA, k)
+        odd = Z[BLOCK_AB, k]
+        add_block(here, COARSE_EAST, k + 1, (-aa_xx, -(odd + aa_xy), odd - aa_xy, -aa_yy))
+        both = take_symmetric(Z, BLOCK_BB, k)
+        across = take_symmetric(here, COARSE_ACROSS, k)
+        subtract_symmetric(here, COARSE_OWN, k + 1, both, across)
+        add_symmetric(after, COARSE_OWN, k + 1, both, across)
 
 
 @kernel
-def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
-    """The coarse matrix `matrix` (parts_i + 1, ROWS, parts_j + 1) of the grid `nodes`.
+def fill_coarse_matrix(nodes, inputs, starts_i, starts_j, matrix):
+    """The coarse matrix `matrix` (parts_i + 1, COARSE_ROWS, parts_j + 1) of the grid `nodes`.
 
-    `starts_i`, `starts_j` are the first fine node of each coarse cell, and the last node; `law` a
-    `regrid.barrier.side_laws.BarrierLaw`.  False if one of the gathered cells is folded.
+    `starts_i`, `starts_j` are the first fine node of each coarse cell, and the last node; `inputs`
+    are `regrid.barrier.side_inputs.BarrierInputs`.  False if one of the gathered cells is folded.
     """
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
     Z = np.empty((COARSE_SCRATCH_ROWS, parts_j))
@@ -268,75 +302,62 @@ def fill_coarse_matrix(nodes, law, starts_i, starts_j, matrix):
         last_columns[k] = (starts_j[k] + starts_j[k + 1]) // 2
         lines[k] = starts_j[k + 1] - starts_j[k]
     matrix[:] = 0.0
-    for part in range(parts_i):
+    for coarse_i in range(parts_i):
         # those of this row, weighed
-        first = (starts_i[part] + starts_i[part + 1] - 1) // 2
-        last = (starts_i[part] + starts_i[part + 1]) // 2
-        gather_cells(nodes, law, first, last, first_columns, last_columns, Z)
-        growth = 0.5 * (law.along_i[GROWTH, first] + law.along_i[GROWTH, last])
-        if not weigh_cells(law, growth, parts_j, Z):
+        first = (starts_i[coarse_i] + starts_i[coarse_i + 1] - 1) // 2
+        last = (starts_i[coarse_i] + starts_i[coarse_i + 1]) // 2
+        gather_cells(nodes, inputs, first, last, first_columns, last_columns, Z)
+        growth = 0.5 * (inputs.along_i[GROWTH, first] + inputs.along_i[GROWTH, last])
+        if not weigh_cells(inputs, growth, parts_j, Z):
             return False
         # second derivatives: corners, narrow cells, straight lines
         Z[BLOCK_AA:] = 0.0
-        add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, law, parts_j, Z)
-        add_corners(UP_X, NEAR_X, UP_G, NEAR_G, law, parts_j, Z)
-        add_corners(UP_X, FAR_X, UP_G, FAR_G, law, parts_j, Z)
-        add_corners(LOW_X, FAR_X, LOW_G, FAR_G, law, parts_j, Z)
-        if functional.has_cell_terms(law):
-            add_cell_terms(functional.take_cell_numbers(law), parts_j, Z)
+        add_corners(LOW_X, NEAR_X, LOW_G, NEAR_G, inputs, parts_j, Z)
+        add_corners(UP_X, NEAR_X, UP_G, NEAR_G, inputs, parts_j, Z)
+        add_corners(UP_X, FAR_X, UP_G, FAR_G, inputs, parts_j, Z)
+        add_corners(LOW_X, FAR_X, LOW_G, FAR_G, inputs, parts_j, Z)
+        if functional.has_cell_terms(inputs):
+            add_cell_terms(functional.take_cell_numbers(inputs), parts_j, Z)
         for k in range(parts_j):
             Z[BLOCK_AA, k] += Z[LINE_Q, k]
             Z[BLOCK_AA + 2, k] += Z[LINE_Q, k]
             Z[BLOCK_BB, k] += Z[SIDE_Q, k]
             Z[BLOCK_BB + 2, k] += Z[SIDE_Q, k]
         # coupled as coarse nodes
-        stretch = starts_i[part + 1] - starts_i[part]
-        couple_nodes(stretch, lines, parts_j, Z, matrix[part], matrix[part + 1])
+        stretch = starts_i[coarse_i + 1] - starts_i[coarse_i]
+        couple_nodes(stretch, lines, parts_j, Z, matrix[coarse_i], matrix[coarse_i + 1])
     return True
 
 
 @kernel(allocates=False)
 def factor_lines(matrix):
-    """Inverse pivots and factors of every line along i into `matrix` (n_i + 1, ROWS, n_j + 1)."""
+    """Fill inverse pivots and factors of every line along i.
+
+    `matrix`: (n_i + 1, COARSE_ROWS, n_j + 1).
+    """
     n_i, n_j = matrix.shape[0] - 1, matrix.shape[2] - 1
     for i in range(1, n_i):
-        past = matrix[i - 1]
-        now = matrix[i]
+        before = matrix[i - 1]
+        here = matrix[i]
         for j in range(1, n_j):
             # the block less the coupling through the row before
-            xx = now[COARSE_OWN, j]
-            xy = now[COARSE_OWN + 1, j]
-            yy = now[COARSE_OWN + 2, j]
+            xx, xy, yy = take_symmetric(here, COARSE_OWN, j)
             if i > 1:
-                a = past[COARSE_EAST, j]
-                b = past[COARSE_EAST + 1, j]
-                c = past[COARSE_EAST + 2, j]
-                d = past[COARSE_EAST + 3, j]
-                p = past[COARSE_FACTOR, j]
-                q = past[COARSE_FACTOR + 1, j]
-                r = past[COARSE_FACTOR + 2, j]
-                s = past[COARSE_FACTOR + 3, j]
-                xx -= a * p + c * r
-                xy -= a * q + c * s
-                yy -= b * q + d * s
-            # its inverse, kept positive
-            square = xx * yy
-            least = LEAST_PIVOT * square
-            determinant = square - xy * xy
-            scale = 1.0 / (determinant if determinant > least else least)
-            xx, xy, yy = yy * scale, -(xy * scale), xx * scale
-            now[COARSE_PIVOT, j] = xx
-            now[COARSE_PIVOT + 1, j] = xy
-            now[COARSE_PIVOT + 2, j] = yy
+                e_xx, e_xy, e_yx, e_yy = take_block(before, COARSE_EAST, j)
+                t_xx, t_xy, t_yx, t_yy = take_block(before, COARSE_FACTOR, j)
+                xx -= e_xx * t_xx + e_yx * t_yx
+                xy -= e_xx * t_xy + e_yx * t_yy
+                yy -= e_xy * t_xy + e_yy * t_yy
+            pivot_xx, pivot_xy, pivot_yy = invert_pivot(xx, xy, yy)
+            here[COARSE_PIVOT, j] = pivot_xx
+            here[COARSE_PIVOT + 1, j] = pivot_xy
+            here[COARSE_PIVOT + 2, j] = pivot_yy
             # factor of the next row
-            a = now[COARSE_EAST, j]
-            b = now[COARSE_EAST + 1, j]
-            c = now[COARSE_EAST + 2, j]
-            d = now[COARSE_EAST + 3, j]
-            now[COARSE_FACTOR, j] = xx * a + xy * c
-            now[COARSE_FACTOR + 1, j] = xx * b + xy * d
-            now[COARSE_FACTOR + 2, j] = xy * a + yy * c
-            now[COARSE_FACTOR + 3, j] = xy * b + yy * d
+            e_xx, e_xy, e_yx, e_yy = take_block(here, COARSE_EAST, j)
+            here[COARSE_FACTOR, j] = pivot_xx * e_xx + pivot_xy * e_yx
+            here[COARSE_FACTOR + 1, j] = pivot_xx * e_xy + pivot_xy * e_yy
+            here[COARSE_FACTOR + 2, j] = pivot_xy * e_xx + pivot_yy * e_yx
+            here[COARSE_FACTOR + 3, j] = pivot_xy * e_xy + pivot_yy * e_yy
 
 
 @compiled_once(allocates=False)
@@ -346,39 +367,42 @@ def solve_lines(matrix, r, z):
     total = 0.0
     # forward
     for i in range(1, n_i):
-        past = matrix[i - 1]
-        z_x = z[0, i]
-        z_y = z[1, i]
-        r_x = r[0, i]
-        r_y = r[1, i]
-        b_x = z[0, i - 1]
-        b_y = z[1, i - 1]
+        before = matrix[i - 1]
+        z_x, z_y = z[0, i], z[1, i]
+        r_x, r_y = r[0, i], r[1, i]
+        before_x, before_y = z[0, i - 1], z[1, i - 1]
         if i == 1:
             for j in range(1, n_j):
                 z_x[j], z_y[j] = r_x[j], r_y[j]
         else:
             for j in range(1, n_j):
-                u, v = b_x[j], b_y[j]
-                z_x[j] = r_x[j] - (past[COARSE_FACTOR, j] * u + past[COARSE_FACTOR + 2, j] * v)
-                z_y[j] = r_y[j] - (past[COARSE_FACTOR + 1, j] * u + past[COARSE_FACTOR + 3, j] * v)
+                factor = transpose_block(take_block(before, COARSE_FACTOR, j))
+                passed_x, passed_y = multiply_block(factor, before_x[j], before_y[j])
+                z_x[j] = r_x[j] - passed_x
+                z_y[j] = r_y[j] - passed_y
     # backward
     for i in range(n_i - 1, 0, -1):
-        now = matrix[i]
-        z_x = z[0, i]
-        z_y = z[1, i]
-        r_x = r[0, i]
-        r_y = r[1, i]
-        a_x = z[0, i + 1]
-        a_y = z[1, i + 1]
+        here = matrix[i]
+        z_x, z_y = z[0, i], z[1, i]
+        r_x, r_y = r[0, i], r[1, i]
+        after_x, after_y = z[0, i + 1], z[1, i + 1]
         for j in range(1, n_j):
-            u, v = z_x[j], z_y[j]
-            x = now[COARSE_PIVOT, j] * u + now[COARSE_PIVOT + 1, j] * v
-            y = now[COARSE_PIVOT + 1, j] * u + now[COARSE_PIVOT + 2, j] * v
-            z_x[j] = x - (now[COARSE_FACTOR, j] * a_x[j] + now[COARSE_FACTOR + 1, j] * a_y[j])
-            z_y[j] = y - (now[COARSE_FACTOR + 2, j] * a_x[j] + now[COARSE_FACTOR + 3, j] * a_y[j])
+            pivot = take_whole(here, COARSE_PIVOT, j)
+            factor = take_block(here, COARSE_FACTOR, j)
+            forward_x, forward_y = multiply_block(pivot, z_x[j], z_y[j])
+            passed_x, passed_y = multiply_block(factor, after_x[j], after_y[j])
+            z_x[j] = forward_x - passed_x
+            z_y[j] = forward_y - passed_y
         for j in range(1, n_j):
             total += r_x[j] * z_x[j] + r_y[j] * z_y[j]
     return total
+
+
+@inlined
+def take_whole(rows, start, k):
+    """The symmetric block in three rows (xx, xy, yy) from `start` on, as a whole one."""
+    xx, xy, yy = take_symmetric(rows, start, k)
+    return xx, xy, xy, yy
 
 
 @kernel(allocates=False)
@@ -387,53 +411,39 @@ def fill_product(matrix, p, out):
     n_i, n_j = p.shape[1] - 1, p.shape[2] - 1
     total = 0.0
     for i in range(1, n_i):
-        past = matrix[i - 1]
-        now = matrix[i]
-        b_x = p[0, i - 1]
-        b_y = p[1, i - 1]
-        h_x = p[0, i]
-        h_y = p[1, i]
-        a_x = p[0, i + 1]
-        a_y = p[1, i + 1]
+        before = matrix[i - 1]
+        here = matrix[i]
+        before_x, before_y = p[0, i - 1], p[1, i - 1]
+        here_x, here_y = p[0, i], p[1, i]
+        after_x, after_y = p[0, i + 1], p[1, i + 1]
         out_x, out_y = out[0, i], out[1, i]
         for j in range(1, n_j):
             # the node, and its neighbours along i and j
-            u, v = h_x[j], h_y[j]
-            x, y = (
-                now[COARSE_OWN, j] * u + now[COARSE_OWN + 1, j] * v,
-                now[COARSE_OWN + 1, j] * u + now[COARSE_OWN + 2, j] * v,
-            )
-            u, v = a_x[j], a_y[j]
-            x += now[COARSE_EAST, j] * u + now[COARSE_EAST + 1, j] * v
-            y += now[COARSE_EAST + 2, j] * u + now[COARSE_EAST + 3, j] * v
-            u, v = b_x[j], b_y[j]
-            x += past[COARSE_EAST, j] * u + past[COARSE_EAST + 2, j] * v
-            y += past[COARSE_EAST + 1, j] * u + past[COARSE_EAST + 3, j] * v
-            u, v = h_x[j + 1], h_y[j + 1]
-            x += now[COARSE_NORTH, j] * u + now[COARSE_NORTH + 1, j] * v
-            y += now[COARSE_NORTH + 2, j] * u + now[COARSE_NORTH + 3, j] * v
-            u, v = h_x[j - 1], h_y[j - 1]
-            x += now[COARSE_NORTH, j - 1] * u + now[COARSE_NORTH + 2, j - 1] * v
-            y += now[COARSE_NORTH + 1, j - 1] * u + now[COARSE_NORTH + 3, j - 1] * v
-            out_x[j], out_y[j] = x, y
+            sums = multiply_block(take_whole(here, COARSE_OWN, j), here_x[j], here_y[j])
+            block = take_block(here, COARSE_EAST, j)
+            sums = add_neighbour(sums, block, after_x[j], after_y[j])
+            block = transpose_block(take_block(before, COARSE_EAST, j))
+            sums = add_neighbour(sums, block, before_x[j], before_y[j])
+            block = take_block(here, COARSE_NORTH, j)
+            sums = add_neighbour(sums, block, here_x[j + 1], here_y[j + 1])
+            block = transpose_block(take_block(here, COARSE_NORTH, j - 1))
+            sums = add_neighbour(sums, block, here_x[j - 1], here_y[j - 1])
+            out_x[j], out_y[j] = sums
         for j in range(1, n_j):
             # the couplings across the four cells around the node are symmetric blocks
-            u, v = a_x[j + 1], a_y[j + 1]
-            x = -(now[COARSE_ACROSS, j] * u + now[COARSE_ACROSS + 1, j] * v)
-            y = -(now[COARSE_ACROSS + 1, j] * u + now[COARSE_ACROSS + 2, j] * v)
-            u, v = a_x[j - 1], a_y[j - 1]
-            x += now[COARSE_ACROSS, j - 1] * u + now[COARSE_ACROSS + 1, j - 1] * v
-            y += now[COARSE_ACROSS + 1, j - 1] * u + now[COARSE_ACROSS + 2, j - 1] * v
-            u, v = b_x[j + 1], b_y[j + 1]
-            x += past[COARSE_ACROSS, j] * u + past[COARSE_ACROSS + 1, j] * v
-            y += past[COARSE_ACROSS + 1, j] * u + past[COARSE_ACROSS + 2, j] * v
-            u, v = b_x[j - 1], b_y[j - 1]
-            x -= past[COARSE_ACROSS, j - 1] * u + past[COARSE_ACROSS + 1, j - 1] * v
-            y -= past[COARSE_ACROSS + 1, j - 1] * u + past[COARSE_ACROSS + 2, j - 1] * v
-            out_x[j] += x
-            out_y[j] += y
+            block = take_whole(here, COARSE_ACROSS, j)
+            x, y = multiply_block(block, after_x[j + 1], after_y[j + 1])
+            sums = (-x, -y)
+            block = take_whole(here, COARSE_ACROSS, j - 1)
+            sums = add_neighbour(sums, block, after_x[j - 1], after_y[j - 1])
+            block = take_whole(before, COARSE_ACROSS, j)
+            sums = add_neighbour(sums, block, before_x[j + 1], before_y[j + 1])
+            block = take_whole(before, COARSE_ACROSS, j - 1)
+            x, y = multiply_block(block, before_x[j - 1], before_y[j - 1])
+            out_x[j] += sums[0] - x
+            out_y[j] += sums[1] - y
         for j in range(1, n_j):
-            total += h_x[j] * out_x[j] + h_y[j] * out_y[j]
+            total += here_x[j] * out_x[j] + here_y[j] * out_y[j]
     return total
 
 
@@ -443,14 +453,14 @@ def multiply_coarse(directions, beta, first, last, matrix, out, totals, Z):
 
     All its columns are one chunk, and the whole sum is in the first one.
     """
-    direction, step, old = directions
+    direction, z, old = directions
     for k in range(2):
         for i in range(1, out.shape[1] - 1):
             direction_row = direction[k, i]
-            step_row = step[k, i]
+            z_row = z[k, i]
             old_row = old[k, i]
             for j in range(out.shape[2]):
-                direction_row[j] = step_row[j] + beta * old_row[j]
+                direction_row[j] = z_row[j] + beta * old_row[j]
     totals[first] = fill_product(matrix, direction, out)
 
 
@@ -464,11 +474,11 @@ def advance_coarse(alpha, step, vectors, first, last, matrix, totals):
             for i in range(1, r.shape[1] - 1):
                 x_row = x[k, i]
                 r_row = r[k, i]
-                p_row = direction[k, i]
-                h_row = product[k, i]
+                direction_row = direction[k, i]
+                product_row = product[k, i]
                 for j in range(r.shape[2]):
-                    x_row[j] += alpha * p_row[j]
-                    r_row[j] -= alpha * h_row[j]
+                    x_row[j] += alpha * direction_row[j]
+                    r_row[j] -= alpha * product_row[j]
     totals[first] = solve_lines(matrix, r, z)
 
 
@@ -476,13 +486,13 @@ solve_coarse = make_solver(False, multiply_coarse, advance_coarse)
 NO_FLOOR = 0.0
 
 
-def solve(matrix, vectors, tolerance: float, most: int) -> int:
-    """Improve the solution x of the factored `matrix` (n_i + 1, ROWS, n_j + 1) for a right side.
+def solve(matrix, vectors, tolerance: float, most_iterations: int) -> int:
+    """Improve the solution x of a factored matrix for a right side.
 
-    `vectors` (6, 2, n_i + 1, n_j + 1) are the right side, which is overwritten, x, and work arrays,
-    with zeros on the boundary.  It stops when the squared residual, in the norm of the line solve,
-    is below `tolerance`² of its first value, or after `most` iterations; returns their number, or
-    -1 where the matrix is not positive definite.
+    `matrix`: (n_i + 1, COARSE_ROWS, n_j + 1); `vectors` (6, 2, n_i + 1, n_j + 1): the right side,
+    which is overwritten, x, and work arrays, with zeros on the boundary.  It stops when the squared
+    residual, in the norm of the line solve, is below `tolerance`² of its first value, or after
+    `most_iterations`; returns their number, or -1 where the matrix is not positive definite.
     """
     r, x, z, p, p_old, product = vectors
     # one chunk of all columns, whose sums stay zero but in the first one
@@ -492,8 +502,8 @@ def solve(matrix, vectors, tolerance: float, most: int) -> int:
     # residual of the first x
     fill_product(matrix, x, product)
     r -= product
-    done, first, _, positive = solve_coarse(
+    iterations, first_square, _, positive = solve_coarse(
         columns, matrix[np.newaxis], (x, r, z), (p, p_old, product), totals,
-        (tolerance, NO_FLOOR, most), scratch,
+        (tolerance, NO_FLOOR, most_iterations), scratch,
     )  # fmt: skip
-    return done if first >= 0.0 and positive else -1
+    return iterations if first_square >= 0.0 and positive else -1

@@ -40,9 +40,10 @@ def cut_evenly(count: int, parts: int) -> np.ndarray:
     is even.  Lengths differ by at most two.
     """
     parts = min(parts + (count % 2 == 1 and parts % 2 == 0), count)
-    low = [count * part // parts for part in range(parts // 2 + 1)]
-    high = [count - index for index in reversed(low)]
-    return np.array(low + [index for index in high if index > low[-1]], dtype=np.int64)
+    first_half = [count * part // parts for part in range(parts // 2 + 1)]
+    second_half = [count - start for start in reversed(first_half)]
+    starts = first_half + [start for start in second_half if start > first_half[-1]]
+    return np.array(starts, dtype=np.int64)
 
 
 @kernel(allocates=False)
@@ -70,20 +71,20 @@ def fill_coarse_right(starts_j, sums, right):
     parts_i, parts_j = right.shape[1] - 1, right.shape[2] - 1
     right[:] = 0.0
     for k in range(2):
-        for part_i in range(1, parts_i):
-            row = sums[k, part_i]
-            out = right[k, part_i]
-            for part_j in range(parts_j):
-                begin = starts_j[part_j]
-                end = starts_j[part_j + 1]
-                near = 0.0
-                far = 0.0
+        for coarse_i in range(1, parts_i):
+            row = sums[k, coarse_i]
+            out = right[k, coarse_i]
+            for coarse_j in range(parts_j):
+                begin = starts_j[coarse_j]
+                end = starts_j[coarse_j + 1]
+                to_first = 0.0
+                to_second = 0.0
                 for j in range(max(begin, 1), end):
-                    v = (j - begin) / (end - begin)
-                    near += (1.0 - v) * row[j]
-                    far += v * row[j]
-                out[part_j] -= near
-                out[part_j + 1] -= far
+                    passed = (j - begin) / (end - begin)
+                    to_first += (1.0 - passed) * row[j]
+                    to_second += passed * row[j]
+                out[coarse_j] -= to_first
+                out[coarse_j + 1] -= to_second
             out[0] = out[parts_j] = 0.0
 
 
@@ -95,22 +96,22 @@ def take_frames(nodes, starts_i, starts_j, right, lines, solution):
     `solution` (2, parts_i + 1, parts_j + 1).  False if lines do not cross at a coarse node.
     """
     x, y = nodes
-    for part_i in range(1, starts_i.shape[0] - 1):
-        for part_j in range(1, starts_j.shape[0] - 1):
-            i, j = starts_i[part_i], starts_j[part_j]
+    for coarse_i in range(1, starts_i.shape[0] - 1):
+        for coarse_j in range(1, starts_j.shape[0] - 1):
+            i, j = starts_i[coarse_i], starts_j[coarse_j]
             ix, iy = 0.5 * (x[i + 1, j] - x[i - 1, j]), 0.5 * (y[i + 1, j] - y[i - 1, j])
             jx, jy = 0.5 * (x[i, j + 1] - x[i, j - 1]), 0.5 * (y[i, j + 1] - y[i, j - 1])
             area = ix * jy - iy * jx
             if not area > 0.0:
                 return False
-            alpha = right[0, part_i, part_j] / area
-            beta = right[1, part_i, part_j] / area
-            right[0, part_i, part_j] = alpha * jy - beta * iy
-            right[1, part_i, part_j] = beta * ix - alpha * jx
-            alpha = lines[0, part_i, j]
-            beta = lines[1, part_i, j]
-            solution[0, part_i, part_j] = alpha * ix + beta * jx
-            solution[1, part_i, part_j] = alpha * iy + beta * jy
+            alpha = right[0, coarse_i, coarse_j] / area
+            beta = right[1, coarse_i, coarse_j] / area
+            right[0, coarse_i, coarse_j] = alpha * jy - beta * iy
+            right[1, coarse_i, coarse_j] = beta * ix - alpha * jx
+            alpha = lines[0, coarse_i, j]
+            beta = lines[1, coarse_i, j]
+            solution[0, coarse_i, coarse_j] = alpha * ix + beta * jx
+            solution[1, coarse_i, coarse_j] = alpha * iy + beta * jy
     return True
 
 
@@ -119,38 +120,40 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
     """Convert the displacement `solution` (2, parts_i + 1, parts_j + 1) to alpha and beta.
 
     It is overwritten; the result in `lines` (2, parts_i + 1, nj + 1) is linear between coarse nodes
-    and zero on the sides.  Returns its largest part over the shortest edge there, in cells.
+    and zero on the sides.  Returns its largest size over the shortest edge there, in cells.
     """
     x, y = nodes
     parts_i, parts_j = starts_i.shape[0] - 1, starts_j.shape[0] - 1
-    most = 0.0
+    largest_square = 0.0
     lines[:] = 0.0
-    for part_i in range(1, parts_i):
-        for part_j in range(1, parts_j):
+    for coarse_i in range(1, parts_i):
+        for coarse_j in range(1, parts_j):
             # frame of the lines at the coarse node (R4.13), and its shortest edge
-            i, j = starts_i[part_i], starts_j[part_j]
+            i, j = starts_i[coarse_i], starts_j[coarse_j]
             ix, iy = 0.5 * (x[i + 1, j] - x[i - 1, j]), 0.5 * (y[i + 1, j] - y[i - 1, j])
             jx, jy = 0.5 * (x[i, j + 1] - x[i, j - 1]), 0.5 * (y[i, j + 1] - y[i, j - 1])
-            dx, dy = solution[0, part_i, part_j], solution[1, part_i, part_j]
+            dx, dy = solution[0, coarse_i, coarse_j], solution[1, coarse_i, coarse_j]
             shortest = np.inf
-            for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-                edge_x, edge_y = x[a, b] - x[i, j], y[a, b] - y[i, j]
+            for next_i, next_j in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+                edge_x, edge_y = x[next_i, next_j] - x[i, j], y[next_i, next_j] - y[i, j]
                 shortest = min(shortest, edge_x * edge_x + edge_y * edge_y)
-            most = max(most, (dx * dx + dy * dy) / shortest)
+            largest_square = max(largest_square, (dx * dx + dy * dy) / shortest)
             # the displacement in this frame
             area = ix * jy - iy * jx
-            solution[0, part_i, part_j] = (dx * jy - dy * jx) / area
-            solution[1, part_i, part_j] = (ix * dy - iy * dx) / area
+            solution[0, coarse_i, coarse_j] = (dx * jy - dy * jx) / area
+            solution[1, coarse_i, coarse_j] = (ix * dy - iy * dx) / area
         # linear between coarse nodes along j
         for k in range(2):
-            for part_j in range(parts_j):
-                begin = starts_j[part_j]
-                end = starts_j[part_j + 1]
-                near = solution[k, part_i, part_j]
-                far = solution[k, part_i, part_j + 1]
+            for coarse_j in range(parts_j):
+                begin = starts_j[coarse_j]
+                end = starts_j[coarse_j + 1]
+                first_value = solution[k, coarse_i, coarse_j]
+                second_value = solution[k, coarse_i, coarse_j + 1]
                 for j in range(begin, end):
-                    lines[k, part_i, j] = near + (far - near) * ((j - begin) / (end - begin))
-    return np.sqrt(most)
+                    lines[k, coarse_i, j] = first_value + (second_value - first_value) * (
+                        (j - begin) / (end - begin)
+                    )
+    return np.sqrt(largest_square)
 
 
 @kernel
@@ -162,33 +165,33 @@ def add_coarse(nodes, starts_i, lines, out):
     nj = nodes.shape[2] - 1
     for k in range(2):
         out[k, 0] = nodes[k, 0]
-        for part in range(starts_i.shape[0] - 1):
-            begin = starts_i[part]
-            end = starts_i[part + 1]
-            near = lines[0, part]
-            far = lines[0, part + 1]
-            near_j = lines[1, part]
-            far_j = lines[1, part + 1]
+        for coarse_i in range(starts_i.shape[0] - 1):
+            begin = starts_i[coarse_i]
+            end = starts_i[coarse_i + 1]
+            first_alpha = lines[0, coarse_i]
+            second_alpha = lines[0, coarse_i + 1]
+            first_beta = lines[1, coarse_i]
+            second_beta = lines[1, coarse_i + 1]
             for i in range(max(begin, 1), end):
-                w = (i - begin) / (end - begin)
-                past = nodes[k, i - 1]
+                passed = (i - begin) / (end - begin)
+                before = nodes[k, i - 1]
                 here = nodes[k, i]
-                then = nodes[k, i + 1]
+                after = nodes[k, i + 1]
                 row = out[k, i]
                 row[0] = here[0]
                 row[nj] = here[nj]
                 for j in range(1, nj):
-                    alpha = near[j] + w * (far[j] - near[j])
-                    beta = near_j[j] + w * (far_j[j] - near_j[j])
-                    along = alpha * (then[j] - past[j]) + beta * (here[j + 1] - here[j - 1])
-                    row[j] = here[j] + 0.5 * along
+                    alpha = first_alpha[j] + passed * (second_alpha[j] - first_alpha[j])
+                    beta = first_beta[j] + passed * (second_beta[j] - first_beta[j])
+                    motion = alpha * (after[j] - before[j]) + beta * (here[j + 1] - here[j - 1])
+                    row[j] = here[j] + 0.5 * motion
         out[k, starts_i[-1]] = nodes[k, starts_i[-1]]
 
 
-def _cut(whole: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """The start of `whole` (n,) as an array of `shape`, and the rest."""
+def _cut(memory: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The start of `memory` (n,) as an array of `shape`, and the memory behind it."""
     size = math.prod(shape)
-    return whole[:size].reshape(shape), whole[size:]
+    return memory[:size].reshape(shape), memory[size:]
 
 
 class Level:
@@ -202,10 +205,10 @@ class Level:
         nodes_j = self.starts_j.size
         self.shapes = (nodes_i, COARSE_ROWS, nodes_j), (6, 2, nodes_i, nodes_j)
 
-    def take_arrays(self, whole: np.ndarray) -> None:
-        """Place matrix and vectors at the start of `whole` (n,)."""
-        self.matrix, whole = _cut(whole, self.shapes[0])
-        self.vectors, whole = _cut(whole, self.shapes[1])
+    def take_arrays(self, memory: np.ndarray) -> None:
+        """Place matrix and vectors at the start of `memory` (n,)."""
+        self.matrix, memory = _cut(memory, self.shapes[0])
+        self.vectors, memory = _cut(memory, self.shapes[1])
 
 
 class CoarseCorrection:
@@ -224,35 +227,35 @@ class CoarseCorrection:
         parts_i = ni // min(
             max(ni // tuning.coarse_stretches, tuning.coarse_lines // 2), tuning.coarse_lines
         )
-        counts = [nj // apart for apart in tuning.coarse_apart if nj // apart >= 2]
-        self.able = ni * nj >= tuning.coarse_from and parts_i >= 2 and bool(counts)
-        if not self.able:
+        parts_j = [nj // apart for apart in tuning.coarse_apart if nj // apart >= 2]
+        self.is_possible = ni * nj >= tuning.coarse_from and parts_i >= 2 and bool(parts_j)
+        if not self.is_possible:
             parts_i = 0
-            counts = []
+            parts_j = []
             nj = 0
         self.starts_i = cut_evenly(ni, parts_i) if parts_i else np.zeros(1, dtype=np.int64)
-        self.levels = [Level(self.starts_i.size, count, nj) for count in counts]
+        self.levels = [Level(self.starts_i.size, count, nj) for count in parts_j]
         self._shape = 2, self.starts_i.size, nj + 1
-        own = (sum(map(math.prod, level.shapes)) for level in self.levels)
-        self.size = 2 * math.prod(self._shape) + max(own, default=0)
+        level_sizes = (sum(map(math.prod, level.shapes)) for level in self.levels)
+        self.size = 2 * math.prod(self._shape) + max(level_sizes, default=0)
         self.iterations = 0
 
-    def take_arrays(self, whole: np.ndarray) -> None:
-        """Work in `whole` (`size` or more,), from a residual check to the correction after it."""
-        self.sums, whole = _cut(whole, self._shape)
-        self.lines, whole = _cut(whole, self._shape)
+    def take_arrays(self, memory: np.ndarray) -> None:
+        """Work in `memory` (`size` or more,), from a residual check to the correction after it."""
+        self.sums, memory = _cut(memory, self._shape)
+        self.lines, memory = _cut(memory, self._shape)
         for level in self.levels:
-            level.take_arrays(whole)
+            level.take_arrays(memory)
 
-    def find(self, nodes: np.ndarray, law, least: float = 0.0) -> float:
-        """Solve for the correction of `nodes` (2, ni+1, nj+1), from their check's sums and `law`.
+    def find(self, nodes: np.ndarray, inputs, least_size: float = 0.0) -> float:
+        """Solve for the correction of `nodes` (2, ni+1, nj+1), from the sums of their check.
 
-        Returns its largest part over the shortest edge there, in cells; 0 in small blocks, without
-        a solution, and if the coarsest nodes move by less than `least`.
+        Returns its largest size over the shortest edge there, in cells; 0 in small blocks, without
+        a solution, and if the coarsest nodes move by less than `least_size`.
         """
         size = 0.0
         self.iterations = 0
-        if not self.able:
+        if not self.is_possible:
             return 0.0
         self.lines[:] = 0.0
         tuning = self.tuning
@@ -266,22 +269,27 @@ class CoarseCorrection:
             fill_coarse_right(level.starts_j, self.sums, right)
             if not take_frames(nodes, *starts, right, self.lines, solution):
                 return 0.0
-            if not fill_coarse_matrix(nodes, law, *starts, level.matrix):
+            if not fill_coarse_matrix(nodes, inputs, *starts, level.matrix):
                 return 0.0
             # solved
             factor_lines(level.matrix)
-            done = solve(level.matrix, level.vectors, tuning.exact_tolerance, tuning.max_iterations)
-            if done < 0:
+            iterations = solve(
+                level.matrix, level.vectors, tuning.exact_tolerance, tuning.max_iterations
+            )
+            if iterations < 0:
                 return 0.0
-            self.iterations += done
+            self.iterations += iterations
             # as displacements along the lines
             size = float(fill_coarse_lines(nodes, *starts, solution, self.lines))
-            if size < least:
+            if size < least_size:
                 return 0.0
         self.lines *= tuning.coarse_part
         return tuning.coarse_part * size
 
-    def add(self, nodes: np.ndarray, out: np.ndarray, part: float = 1.0) -> None:
-        """`out` = `nodes` plus `part` of the correction, both (2, ni+1, nj+1); sides unchanged."""
-        self.lines *= part
+    def add(self, nodes: np.ndarray, out: np.ndarray, fraction: float = 1.0) -> None:
+        """`out` = `nodes` plus a `fraction` of the correction; sides are unchanged.
+
+        Both (2, ni+1, nj+1).
+        """
+        self.lines *= fraction
         add_coarse(nodes, self.starts_i, self.lines, out)

@@ -13,17 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, fill_laws
+from shockgrid.regrid.barrier.side_inputs import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, fill_spacings
 from shockgrid.regrid.measure.corners import BLOCK_CORNERS
 from shockgrid.regrid.measure.quality import compute_scaled_jacobians
 
 EASE_POWER = 6  # of the least sine of a cell of the first grid
-OTHER_PART = 3.0  # factor between an edge's part of its line and that of the sides
+# factor between an edge's part of its line and that of the sides from which they disagree
+DISAGREEING_FACTOR = 3.0
 FEW_EDGES = 0.1  # of a family's edges
 
 
 class SideLengths(NamedTuple):
-    """The laws of four sides, as `BarrierLaw` has them: `along_i` (5, ni), `along_j` (5, nj),
+    """The spacings of four sides, as in `BarrierInputs`: `along_i` (5, ni), `along_j` (5, nj),
     `blend_i` (ni+1), `blend_j` (nj+1)."""
 
     along_i: np.ndarray
@@ -39,17 +40,17 @@ class SideLengths(NamedTuple):
 
     def find_steps(self) -> tuple[np.ndarray, np.ndarray]:
         """The same of the straight lines' spacings, 1 in the mean of a line."""
-        part_i = np.linspace(0.0, 1.0, self.blend_i.size)[:, None]
-        part_j = np.linspace(0.0, 1.0, self.blend_j.size)
-        i = self.along_i[STEP, :, None] + part_j * self.along_i[STEP_CHANGE, :, None]
-        j = self.along_j[STEP] + part_i * self.along_j[STEP_CHANGE]
+        place_i = np.linspace(0.0, 1.0, self.blend_i.size)[:, None]
+        place_j = np.linspace(0.0, 1.0, self.blend_j.size)
+        i = self.along_i[STEP, :, None] + place_j * self.along_i[STEP_CHANGE, :, None]
+        j = self.along_j[STEP] + place_i * self.along_j[STEP_CHANGE]
         return i, j
 
 
 class GivenSpacing(NamedTuple):
     """Shares `i` (2, ni, nj+1) and `j` (2, ni+1, nj) of a first grid's edges along i and j.
 
-    First the length that the sides interpolate over the edge's own one, then the same of its part
+    First the length that the sides interpolate over the edge's length, then the same of its part
     of the line.  `ease` (ni, nj): factors of the barrier in the cells.
     """
 
@@ -77,37 +78,37 @@ class GivenSpacing(NamedTuple):
         return 0.5 * (i[:, 1:] + i[:, :-1]), 0.5 * (j[1:] + j[:-1])
 
 
-def find_given_spacing(first: np.ndarray) -> GivenSpacing:
-    """The spacing of a convex grid `first` (2, ni+1, nj+1)."""
-    ni, nj = first.shape[1] - 1, first.shape[2] - 1
+def find_given_spacing(first_grid: np.ndarray) -> GivenSpacing:
+    """The spacing of a convex grid (2, ni+1, nj+1)."""
+    ni, nj = first_grid.shape[1] - 1, first_grid.shape[2] - 1
     sides = SideLengths(np.zeros((5, ni)), np.zeros((5, nj)), np.zeros(ni + 1), np.zeros(nj + 1))
-    fill_laws(first, True, *sides)
+    fill_spacings(first_grid, True, *sides)
     shares = []
     for axis, (length, step) in enumerate(
         zip(sides.find_lengths(), sides.find_steps(), strict=True)
     ):
-        own = np.hypot(*np.diff(first, axis=axis + 1))
-        own_step = own / own.mean(axis=axis, keepdims=True)
-        shares.append(np.array((length / own, step / own_step)))
-    return GivenSpacing(*shares, compute_ease(first))
+        edge_length = np.hypot(*np.diff(first_grid, axis=axis + 1))
+        edge_step = edge_length / edge_length.mean(axis=axis, keepdims=True)
+        shares.append(np.array((length / edge_length, step / edge_step)))
+    return GivenSpacing(*shares, compute_ease(first_grid))
 
 
-def compute_ease(first: np.ndarray) -> np.ndarray:
+def compute_ease(first_grid: np.ndarray) -> np.ndarray:
     """Factors (ni, nj) of the barrier in the cells: 1 in rectangles (theory R4.20)."""
-    sines = compute_scaled_jacobians(first)
+    sines = compute_scaled_jacobians(first_grid)
     for corner, i, j in BLOCK_CORNERS:
         sines[corner, i, j] = 1.0
     return np.minimum(1.0, sines.min(axis=0)) ** EASE_POWER
 
 
-def is_told_by_sides(spacing: GivenSpacing) -> bool:
-    """Do the sides tell the spacing of a grid: are its lines not graded otherwise than they are?
+def agrees_with_sides(spacing: GivenSpacing) -> bool:
+    """Whether the lines of a grid are graded as its sides are.
 
     In grids that are made between sides alone hardly an edge has three times the part of its line
     that the sides give it, or a third.
     """
     for shares in (spacing.i[1], spacing.j[1]):
-        other = np.abs(np.log(shares)) > np.log(OTHER_PART)
-        if other.mean() > FEW_EDGES:
+        disagrees = np.abs(np.log(shares)) > np.log(DISAGREEING_FACTOR)
+        if disagrees.mean() > FEW_EDGES:
             return False
     return True

@@ -11,7 +11,18 @@ from __future__ import annotations
 
 from numba import prange
 
-from shockgrid.regrid.barrier import assembly as at
+from shockgrid.regrid.barrier.assembly import (
+    FINE_CROSS,
+    FINE_DIAGONAL,
+    FINE_EAST,
+    FINE_FACTOR,
+    FINE_NORTH,
+    FINE_OWN,
+    FINE_PIVOT,
+    NODE_ROWS,
+    take_block,
+    transpose_block,
+)
 from shockgrid.regrid.barrier.step_control import CHUNK_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
@@ -19,78 +30,87 @@ from shockgrid.regrid.jit import compiled_once, inlined, kernel
 # far from them: a store less than 2 kB behind a shifted load halves the vector length (LLVM
 # protects store-to-load forwarding).
 BEFORE_X, BEFORE_Y, HERE_X, HERE_Y, AFTER_X, AFTER_Y = (k * CHUNK_SPAN for k in range(6))
-OUT_X = 10 * CHUNK_SPAN
-OUT_Y = 11 * CHUNK_SPAN
+PRODUCT_X = 10 * CHUNK_SPAN
+PRODUCT_Y = 11 * CHUNK_SPAN
 
 
 @inlined
-def fill_product_row(now, past, count, Z):
+def multiply_block(block, x, y):
+    """A 2 × 2 block (xx, xy, yx, yy) times the vector (x, y)."""
+    return block[0] * x + block[1] * y, block[2] * x + block[3] * y
+
+
+@inlined
+def take_symmetric_block(rows, start, col):
+    """The symmetric 2 × 2 block in the three rows (xx, xy, yy) from `start` on, as a whole one."""
+    index = start + col
+    xy = rows[index + CHUNK_SPAN]
+    return rows[index], xy, xy, rows[index + 2 * CHUNK_SPAN]
+
+
+@inlined
+def add_neighbour(sums, block, x, y):
+    """`sums` plus a block times the direction (x, y) at a neighbouring node."""
+    add_x, add_y = multiply_block(block, x, y)
+    return sums[0] + add_x, sums[1] + add_y
+
+
+@inlined
+def fill_product_row(here, before, count, Z):
     """Matrix times direction in one row of nodes, from scratch into scratch.
 
-    `now` and `past` are the matrix rows of this row of nodes and the previous one.
+    `here` and `before` are the matrix rows of this row of nodes and the previous one.  A coupling
+    is stored once; seen from its other end it is transposed.
     """
     for col in range(1, count + 1):
         # the node itself
-        x, y = Z[HERE_X + col], Z[HERE_Y + col]
-        own = now[at.FINE_OWN + CHUNK_SPAN + col]
-        s_x = now[at.FINE_OWN + col] * x + own * y
-        s_y = own * x + now[at.FINE_OWN + 2 * CHUNK_SPAN + col] * y
+        own = take_symmetric_block(here, FINE_OWN, col)
+        sums = multiply_block(own, Z[HERE_X + col], Z[HERE_Y + col])
         # its neighbours along i
-        u, v = Z[AFTER_X + col], Z[AFTER_Y + col]
-        s_x += now[at.FINE_EAST + col] * u + now[at.FINE_EAST + CHUNK_SPAN + col] * v
-        s_y += (
-            now[at.FINE_EAST + 2 * CHUNK_SPAN + col] * u
-            + now[at.FINE_EAST + 3 * CHUNK_SPAN + col] * v
-        )
-        u, v = Z[BEFORE_X + col], Z[BEFORE_Y + col]
-        s_x += past[at.FINE_EAST + col] * u + past[at.FINE_EAST + 2 * CHUNK_SPAN + col] * v
-        s_y += (
-            past[at.FINE_EAST + CHUNK_SPAN + col] * u
-            + past[at.FINE_EAST + 3 * CHUNK_SPAN + col] * v
-        )
+        block = take_block(here, FINE_EAST, col)
+        sums = add_neighbour(sums, block, Z[AFTER_X + col], Z[AFTER_Y + col])
+        block = transpose_block(take_block(before, FINE_EAST, col))
+        sums = add_neighbour(sums, block, Z[BEFORE_X + col], Z[BEFORE_Y + col])
         # along j
-        u, v = Z[HERE_X + col + 1], Z[HERE_Y + col + 1]
-        s_x += now[at.FINE_NORTH + col] * u + now[at.FINE_NORTH + CHUNK_SPAN + col] * v
-        s_y += (
-            now[at.FINE_NORTH + 2 * CHUNK_SPAN + col] * u
-            + now[at.FINE_NORTH + 3 * CHUNK_SPAN + col] * v
-        )
-        u, v = Z[HERE_X + col - 1], Z[HERE_Y + col - 1]
-        s_x += now[at.FINE_NORTH + col - 1] * u + now[at.FINE_NORTH + 2 * CHUNK_SPAN + col - 1] * v
-        s_y += (
-            now[at.FINE_NORTH + CHUNK_SPAN + col - 1] * u
-            + now[at.FINE_NORTH + 3 * CHUNK_SPAN + col - 1] * v
-        )
+        block = take_block(here, FINE_NORTH, col)
+        sums = add_neighbour(sums, block, Z[HERE_X + col + 1], Z[HERE_Y + col + 1])
+        block = transpose_block(take_block(here, FINE_NORTH, col - 1))
+        sums = add_neighbour(sums, block, Z[HERE_X + col - 1], Z[HERE_Y + col - 1])
         # and across cells
-        u, v = Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1]
-        s_x += now[at.FINE_DIAGONAL + col] * u + now[at.FINE_DIAGONAL + CHUNK_SPAN + col] * v
-        s_y += (
-            now[at.FINE_DIAGONAL + 2 * CHUNK_SPAN + col] * u
-            + now[at.FINE_DIAGONAL + 3 * CHUNK_SPAN + col] * v
-        )
-        u, v = Z[BEFORE_X + col - 1], Z[BEFORE_Y + col - 1]
-        s_x += (
-            past[at.FINE_DIAGONAL + col - 1] * u
-            + past[at.FINE_DIAGONAL + 2 * CHUNK_SPAN + col - 1] * v
-        )
-        s_y += (
-            past[at.FINE_DIAGONAL + CHUNK_SPAN + col - 1] * u
-            + past[at.FINE_DIAGONAL + 3 * CHUNK_SPAN + col - 1] * v
-        )
-        u, v = Z[BEFORE_X + col + 1], Z[BEFORE_Y + col + 1]
-        s_x += past[at.FINE_CROSS + col] * u + past[at.FINE_CROSS + CHUNK_SPAN + col] * v
-        s_y += (
-            past[at.FINE_CROSS + 2 * CHUNK_SPAN + col] * u
-            + past[at.FINE_CROSS + 3 * CHUNK_SPAN + col] * v
-        )
-        u, v = Z[AFTER_X + col - 1], Z[AFTER_Y + col - 1]
-        s_x += now[at.FINE_CROSS + col - 1] * u + now[at.FINE_CROSS + 2 * CHUNK_SPAN + col - 1] * v
-        s_y += (
-            now[at.FINE_CROSS + CHUNK_SPAN + col - 1] * u
-            + now[at.FINE_CROSS + 3 * CHUNK_SPAN + col - 1] * v
-        )
-        Z[OUT_X + col] = s_x
-        Z[OUT_Y + col] = s_y
+        block = take_block(here, FINE_DIAGONAL, col)
+        sums = add_neighbour(sums, block, Z[AFTER_X + col + 1], Z[AFTER_Y + col + 1])
+        block = transpose_block(take_block(before, FINE_DIAGONAL, col - 1))
+        sums = add_neighbour(sums, block, Z[BEFORE_X + col - 1], Z[BEFORE_Y + col - 1])
+        block = take_block(before, FINE_CROSS, col)
+        sums = add_neighbour(sums, block, Z[BEFORE_X + col + 1], Z[BEFORE_Y + col + 1])
+        block = transpose_block(take_block(here, FINE_CROSS, col - 1))
+        sums = add_neighbour(sums, block, Z[AFTER_X + col - 1], Z[AFTER_Y + col - 1])
+        Z[PRODUCT_X + col] = sums[0]
+        Z[PRODUCT_Y + col] = sums[1]
+
+
+@inlined
+def load_direction_row(directions, beta, i, low, count, Z):
+    """Load row i of the direction as the row AFTER: from `direction` itself if `beta` is negative.
+
+    Else it is `z + beta old`, also stored in `direction`; `count` columns from `low` on.
+    """
+    direction, z, old = directions
+    high = low + count
+    row_x, row_y = direction[0, i, low:high], direction[1, i, low:high]
+    if beta >= 0.0:
+        z_x, z_y = z[0, i, low:high], z[1, i, low:high]
+        old_x, old_y = old[0, i, low:high], old[1, i, low:high]
+        for col in range(count):
+            Z[AFTER_X + col] = z_x[col] + beta * old_x[col]
+            Z[AFTER_Y + col] = z_y[col] + beta * old_y[col]
+        for col in range(count):
+            row_x[col] = Z[AFTER_X + col]
+            row_y[col] = Z[AFTER_Y + col]
+    else:
+        for col in range(count):
+            Z[AFTER_X + col] = row_x[col]
+            Z[AFTER_Y + col] = row_y[col]
 
 
 @compiled_once(allocates=False)
@@ -101,15 +121,14 @@ def multiply(directions, beta, first, last, H, out, totals, Z):
     All arrays (2, ni+1, nj+1) with zeros on the boundary, `totals` (nj+1).  If `beta` is negative
     the direction is used unchanged, including boundary values.
     """
-    direction, z, old = directions
-    ni = z.shape[1] - 1
+    direction = directions[0]
+    ni = direction.shape[1] - 1
     count = last - first
     low = first - 1
-    high = last + 1
-    # rows of the direction pass through the scratch, one ahead
     total = totals[first:last]
     for k in range(count):
         total[k] = 0.0
+    # rows of the direction pass through the scratch, one ahead
     for col in range(count + 2):
         Z[HERE_X + col] = 0.0
         Z[HERE_Y + col] = 0.0
@@ -121,33 +140,34 @@ def multiply(directions, beta, first, last, H, out, totals, Z):
             Z[BEFORE_Y + col] = Z[HERE_Y + col]
             Z[HERE_X + col] = Z[AFTER_X + col]
             Z[HERE_Y + col] = Z[AFTER_Y + col]
-        # the next row of the direction
-        new_x, new_y = direction[0, i + 1, low:high], direction[1, i + 1, low:high]
-        if beta >= 0.0:
-            step_x, step_y = z[0, i + 1, low:high], z[1, i + 1, low:high]
-            old_x, old_y = old[0, i + 1, low:high], old[1, i + 1, low:high]
-            for col in range(count + 2):
-                Z[AFTER_X + col] = step_x[col] + beta * old_x[col]
-                Z[AFTER_Y + col] = step_y[col] + beta * old_y[col]
-            for col in range(count + 2):
-                new_x[col] = Z[AFTER_X + col]
-                new_y[col] = Z[AFTER_Y + col]
-        else:
-            for col in range(count + 2):
-                Z[AFTER_X + col] = new_x[col]
-                Z[AFTER_Y + col] = new_y[col]
+        load_direction_row(directions, beta, i + 1, low, count + 2, Z)
         # product of the row in the middle
         if i > 0:
-            now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
-            past = H[(i - 1) * at.NODE_ROWS : i * at.NODE_ROWS]
-            fill_product_row(now, past, count, Z)
+            here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+            before = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            fill_product_row(here, before, count, Z)
             out_x, out_y = out[0, i, first:last], out[1, i, first:last]
             for k in range(count):
-                out_x[k] = Z[OUT_X + k + 1]
-                out_y[k] = Z[OUT_Y + k + 1]
-                total[k] += (
-                    Z[HERE_X + k + 1] * Z[OUT_X + k + 1] + Z[HERE_Y + k + 1] * Z[OUT_Y + k + 1]
-                )
+                product_x, product_y = Z[PRODUCT_X + k + 1], Z[PRODUCT_Y + k + 1]
+                out_x[k] = product_x
+                out_y[k] = product_y
+                total[k] += Z[HERE_X + k + 1] * product_x + Z[HERE_Y + k + 1] * product_y
+
+
+@inlined
+def add_step_row(alpha, step, vectors, i, first, last):
+    """`x += alpha p` and `r -= alpha Hp` in row i; `step` is p and Hp, `vectors` are x, r, z."""
+    direction, product = step
+    x, r, _ = vectors
+    solution_x, solution_y = x[0, i, first:last], x[1, i, first:last]
+    residual_x, residual_y = r[0, i, first:last], r[1, i, first:last]
+    direction_x, direction_y = direction[0, i, first:last], direction[1, i, first:last]
+    product_x, product_y = product[0, i, first:last], product[1, i, first:last]
+    for k in range(last - first):
+        solution_x[k] += alpha * direction_x[k]
+        solution_y[k] += alpha * direction_y[k]
+        residual_x[k] -= alpha * product_x[k]
+        residual_y[k] -= alpha * product_y[k]
 
 
 @compiled_once(allocates=False)
@@ -157,67 +177,45 @@ def advance(alpha, step, vectors, first, last, H, totals):
     `step` is p and Hp, `vectors` are x, r, z.  Nothing is added if alpha is 0, so `step` may be
     undefined in the first call.
     """
-    direction, product = step
-    x, r, z = vectors
-    ni = x.shape[1] - 1
+    _, r, z = vectors
+    ni = r.shape[1] - 1
     count = last - first
     total = totals[first:last]
     for i in range(1, ni):
-        x_x = x[0, i, first:last]
-        x_y = x[1, i, first:last]
-        r_x, r_y = r[0, i, first:last], r[1, i, first:last]
-        # the step
         if alpha != 0.0:
-            p_x, p_y = direction[0, i, first:last], direction[1, i, first:last]
-            h_x, h_y = product[0, i, first:last], product[1, i, first:last]
-            for k in range(count):
-                x_x[k] += alpha * p_x[k]
-                x_y[k] += alpha * p_y[k]
-                r_x[k] -= alpha * h_x[k]
-                r_y[k] -= alpha * h_y[k]
+            add_step_row(alpha, step, vectors, i, first, last)
         # forward along i with the factors of the lines
+        r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         if i == 1:
             for k in range(count):
                 z_x[k] = r_x[k]
                 z_y[k] = r_y[k]
         else:
-            b_x, b_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
-            past = H[(i - 1) * at.NODE_ROWS : i * at.NODE_ROWS]
+            before_x, before_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
+            before = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
             for k in range(count):
-                col = k + 1
-                u, v = b_x[k], b_y[k]
-                z_x[k] = r_x[k] - (
-                    past[at.FINE_FACTOR + col] * u + past[at.FINE_FACTOR + 2 * CHUNK_SPAN + col] * v
-                )
-                z_y[k] = r_y[k] - (
-                    past[at.FINE_FACTOR + CHUNK_SPAN + col] * u
-                    + past[at.FINE_FACTOR + 3 * CHUNK_SPAN + col] * v
-                )
+                factor = transpose_block(take_block(before, FINE_FACTOR, k + 1))
+                passed_x, passed_y = multiply_block(factor, before_x[k], before_y[k])
+                z_x[k] = r_x[k] - passed_x
+                z_y[k] = r_y[k] - passed_y
     for k in range(count):
         total[k] = 0.0
     # backward, and the sums
     for i in range(ni - 1, 0, -1):
-        now = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
+        here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
-        a_x, a_y = z[0, i + 1, first:last], z[1, i + 1, first:last]
+        after_x, after_y = z[0, i + 1, first:last], z[1, i + 1, first:last]
         for k in range(count):
-            col = k + 1
-            u, v = z_x[k], z_y[k]
-            p = a_x[k]
-            q = a_y[k]
-            off = now[at.FINE_PIVOT + CHUNK_SPAN + col]
-            s_x = (now[at.FINE_PIVOT + col] * u + off * v) - (
-                now[at.FINE_FACTOR + col] * p + now[at.FINE_FACTOR + CHUNK_SPAN + col] * q
-            )
-            s_y = (off * u + now[at.FINE_PIVOT + 2 * CHUNK_SPAN + col] * v) - (
-                now[at.FINE_FACTOR + 2 * CHUNK_SPAN + col] * p
-                + now[at.FINE_FACTOR + 3 * CHUNK_SPAN + col] * q
-            )
-            z_x[k] = s_x
-            z_y[k] = s_y
-            total[k] += r_x[k] * s_x + r_y[k] * s_y
+            pivot = take_symmetric_block(here, FINE_PIVOT, k + 1)
+            factor = take_block(here, FINE_FACTOR, k + 1)
+            forward_x, forward_y = multiply_block(pivot, z_x[k], z_y[k])
+            passed_x, passed_y = multiply_block(factor, after_x[k], after_y[k])
+            solved_x, solved_y = forward_x - passed_x, forward_y - passed_y
+            z_x[k] = solved_x
+            z_y[k] = solved_y
+            total[k] += r_x[k] * solved_x + r_y[k] * solved_y
 
 
 @inlined
@@ -253,20 +251,20 @@ def make_solver(parallel, multiply, advance):
         and the last squared residual, and whether the matrix was positive in all directions.
         """
         p, p_old, product = directions
-        tolerance, floor, most = limits
+        tolerance, floor, most_iterations = limits
         chunks = columns.shape[0] - 1
         begin = columns[0]
         end = columns[chunks]
         for c in prange(chunks):
             advance(0.0, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
         # norm of the first residual, and where to stop
-        first = add_columns(totals, begin, end)
-        rz = first
-        stop = max(floor, tolerance * tolerance * first)
+        first_square = add_columns(totals, begin, end)
+        residual_square = first_square
+        stop = max(floor, tolerance * tolerance * first_square)
         beta = 0.0
         done = 0
         positive = True
-        while done < most and rz > stop:
+        while done < most_iterations and residual_square > stop:
             for c in prange(chunks):
                 multiply(
                     (p, vectors[2], p_old), beta, columns[c], columns[c + 1], H[c], product, totals,
@@ -278,15 +276,15 @@ def make_solver(parallel, multiply, advance):
             if not positive:
                 break
             # step, next residual
-            alpha = rz / curvature
+            alpha = residual_square / curvature
             for c in prange(chunks):
                 advance(alpha, (p, product), vectors, columns[c], columns[c + 1], H[c], totals)
             done += 1
-            previous = rz
-            rz = add_columns(totals, begin, end)
-            beta = rz / previous
+            square_before = residual_square
+            residual_square = add_columns(totals, begin, end)
+            beta = residual_square / square_before
             p, p_old = p_old, p
-        return done, first, rz, positive
+        return done, first_square, residual_square, positive
 
     return solve
 

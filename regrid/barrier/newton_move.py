@@ -15,16 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.regrid.algebraic import (
-    fill_displacement,
-    fill_quasi_1d,
-    quasi_1d_grid,
-    transfinite_grid,
-)
-from shockgrid.regrid.barrier.side_laws import compute_stiffness
+from shockgrid.regrid.algebraic import fill_displacement, fill_quasi_1d, quasi_1d_grid, transfinite_grid
+from shockgrid.regrid.barrier.side_inputs import compute_stiffness
 from shockgrid.regrid.barrier.step_control import shorten_steps
 from shockgrid.regrid.barrier.tuning import Tuning
 from shockgrid.regrid.barrier.untangle import Unfolding, unfold, untangle
@@ -37,12 +33,21 @@ from shockgrid.regrid.sides import copy_sides, get_sides
 ROUND_OFF_RESIDUAL = 1e-12  # residual, in cells, that cannot be improved
 DOUBTFUL_CORNER_RATIO = 1e-6  # least ratio up to which the signs of corners are computed exactly
 SLOW_SIDE_FRACTION = 0.3  # of `fast_sides`: slower sides count as at rest
-LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
-LEAST_FOLLOWED_PART = 1.0 / 8.0  # of a predicted motion: shorter ones are not worth a solve
+LEAST_STEP_FRACTION = 1.0 / 64.0  # of a Newton step that would lead uphill
+# of a predicted motion: shorter ones are not worth a solve
+LEAST_FOLLOWED_FRACTION = 1.0 / 8.0
 
 
 class Folded(Exception):
-    """A grid has to be untangled, and how the block is looked at was not chosen for that."""
+    """A grid has to be untangled, and the block's orientation was not chosen for that."""
+
+
+class StartingGrid(NamedTuple):
+    """A grid to begin with: its name for the report, and how it is unfolded, if at all."""
+
+    name: str
+    nodes: np.ndarray
+    unfolding: Unfolding | None
 
 
 class NewtonMove:
@@ -66,16 +71,21 @@ class NewtonMove:
         self.untangles = untangles
         self.repairs = repairs
         self.arguments = begin
-        self.iterations = self.rescues = self.sub_moves = 0
+        # what the report says
+        self.iterations = 0
+        self.rescues = 0
+        self.sub_moves = 0
         self.residual = 0.0
-        self.broken = False
         self.ratio = np.inf
         self.start = "displacement"
-        self.estimate = self.strayed = np.inf
+        self.strayed = np.inf
         self.quality: tuple[float, float, int, int] | None = None
         self.triangles = -1  # unknown
+        # the residual that was estimated, and whether the last solve failed
+        self.estimate = np.inf
+        self.solve_failed = False
         self._begin()
-        self.exempt = work.block.turned
+        self.exempt_corners = work.block.turned_corners
 
     def report(self) -> RegridReport:
         inner = (self.work.ni - 1) * (self.work.nj - 1)
@@ -87,7 +97,7 @@ class NewtonMove:
             least_corner_ratio=self.ratio,
             residual=self.residual,
             start=self.start,
-            exempt_corners=self.exempt,
+            exempt_corners=self.exempt_corners,
             triangles=count_triangles(self.work.trial) if self.triangles < 0 else self.triangles,
             strayed=self.strayed if self.strayed < np.inf else None,
             quality=self.quality,
@@ -101,25 +111,27 @@ class NewtonMove:
             work.load_old()
             copy_sides(work.sides, work.base)
             return False
-        self.moved_ratio, self.estimate, strayed = work.look()
+        check = work.check_displaced_grid()
+        self.displaced_ratio = check.ratio
+        self.estimate = check.residual
+        strayed = check.strayed
         corrected = False
-        if self.moved_ratio > tuning.start_ratio and self._correct_smooth_error():
+        if self.displaced_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed = np.inf
             corrected = True
-        good = self.estimate <= min(
-            max(tuning.idle * tuning.floor, ROUND_OFF_RESIDUAL), self._get_lost()
-        )
-        if not (self.moved_ratio > tuning.start_ratio and good):
+        accepted = max(tuning.idle * tuning.floor, ROUND_OFF_RESIDUAL)
+        is_small = self.estimate <= min(accepted, self._find_lost_residual())
+        if not (self.displaced_ratio > tuning.start_ratio and is_small):
             return False
         self.residual = max(self.residual, self.estimate)
         self.strayed = strayed
         if not corrected:
             self.quality = work.get_quality()
             self.triangles = work.marks.bit_count()
-        if self.moved_ratio <= DOUBTFUL_CORNER_RATIO:  # all of the grid will be read
+        if self.displaced_ratio <= DOUBTFUL_CORNER_RATIO:  # all of the grid will be read
             work.load_old()
         work.base, work.trial = work.trial, work.base
-        return self._accept(self.moved_ratio)
+        return self._accept(self.displaced_ratio)
 
     def _correct_smooth_error(self) -> bool:
         """Remove the smooth errors found by the residual check of the displaced grid; False if they
@@ -133,18 +145,18 @@ class NewtonMove:
             return False  # n cells long, an error of d cells leaves a residual of some d (pi / n)²
         if work.spacing is not None:
             return False  # the sums are those of the sides' lengths
-        if work.coarse.able:
+        if work.coarse.is_possible:
             work.load_old()
-        size = work.coarse.find(work.base, work.law, tuning.smooth_floor)
+        size = work.coarse.find(work.base, work.inputs, tuning.smooth_floor)
         if not tuning.smooth_floor < size < np.inf:
             return False
         moved = float(np.abs(work.base - work.old).max()) / math.sqrt(work.sigma)
         work.coarse.add(work.base, work.trial, min(1.0, tuning.smooth_part * moved / size))
         ratio = work.compare_corners(work.trial, work.old)
-        if not ratio > min(self.moved_ratio, tuning.start_ratio):
+        if not ratio > min(self.displaced_ratio, tuning.start_ratio):
             return False
         work.base, work.trial = work.trial, work.base
-        self.moved_ratio = ratio
+        self.displaced_ratio = ratio
         return True
 
     def run(self) -> bool:
@@ -154,43 +166,47 @@ class NewtonMove:
         """
         work = self.work
         work.load_old()
-        if work.sides is not work.own_sides:  # the displaced grid may share its array
-            copy_sides(work.sides, work.own_sides)
-            work.sides = work.own_sides
+        if work.sides is not work.sides_array:  # the displaced grid may share its array
+            copy_sides(work.sides, work.sides_array)
+            work.sides = work.sides_array
         if self.repairs:
-            return self._make_anew()
+            return self._make_from_sides()
         if self._advance():
             return True
-        begin = work.old.copy()
-        end = work.sides.copy()
+        first_grid = work.old.copy()
+        last_sides = work.sides.copy()
         for halving in range(1, self.tuning.most_halvings + 1):
-            parts = 2**halving
-            work.keep_own(begin, end)
-            self.ratio = np.inf
-            for part in range(1, parts + 1):
-                t = part / parts
-                for now, then, there in zip(
-                    get_sides(work.sides), get_sides(begin), get_sides(end), strict=True
-                ):
-                    now[:] = there if part == parts else then + t * (there - then)
-                self._begin()
-                if not (self.is_settled() or self._advance()):
-                    break
-                work.old[:] = work.trial
-            else:
-                self.sub_moves = parts - 1
-                self.start = "halved"
-                self.strayed = np.inf
+            if self._move_in_parts(first_grid, last_sides, 2**halving):
                 return True
-        work.keep_own(begin, end)
-        return self._make_anew()
+        work.copy_to_arrays(first_grid, last_sides)
+        return self._make_from_sides()
 
-    def _make_anew(self) -> bool:
+    def _move_in_parts(self, first_grid: np.ndarray, last_sides: np.ndarray, parts: int) -> bool:
+        """The whole move in so many equal parts of the sides' motion; True where all succeed."""
+        work = self.work
+        work.copy_to_arrays(first_grid, last_sides)
+        self.ratio = np.inf
+        for part in range(1, parts + 1):
+            fraction = part / parts
+            for side, first, last in zip(
+                get_sides(work.sides), get_sides(first_grid), get_sides(last_sides), strict=True
+            ):
+                side[:] = last if part == parts else first + fraction * (last - first)
+            self._begin()
+            if not (self.is_settled() or self._advance()):
+                return False
+            work.old[:] = work.trial
+        self.sub_moves = parts - 1
+        self.start = "halved"
+        self.strayed = np.inf
+        return True
+
+    def _make_from_sides(self) -> bool:
         """A grid for the sides alone, which no motion leads to: the first that steps can settle.
 
         Where none settles, the one closest to it is taken (theory R5.4).
         """
-        self._check_look()
+        self._check_orientation()
         work = self.work
         if work.ni == 1 or work.nj == 1:
             return False
@@ -198,56 +214,55 @@ class NewtonMove:
         self.sub_moves = 0
         self.residual = 0.0
         self.strayed = np.inf
-        broken = self.broken
+        failed_before = self.solve_failed
         self._begin()
-        work.look()
+        work.check_displaced_grid()
         displaced = work.base.copy()
+        # the grid that comes closest to settling
         best: np.ndarray | None = None
-        least = np.inf
-        possible: bool | None = None
-        for start, nodes, way in self._list_beginnings(displaced):
-            if way is None:
-                if find_folded_cells(nodes).size:
+        least_error = np.inf
+        can_exist: bool | None = None
+        for start in self._list_starting_grids(displaced):
+            if start.unfolding is None:
+                if find_folded_cells(start.nodes).size:
                     continue
             else:
-                if possible is None:
-                    possible = best is not None or find_impossible(work.sides) is None
+                if can_exist is None:
+                    can_exist = best is not None or find_impossible(work.sides) is None
                 self._begin()
-                if not (possible and unfold(work, nodes, self.tuning, way)):
+                if not (can_exist and unfold(work, start.nodes, self.tuning, start.unfolding)):
                     continue
-            error = self._settle(nodes)
-            if best is None or error < least:
+            error = self._settle(start.nodes)
+            if best is None or error < least_error:
                 best = work.trial.copy()
-                least = error
-                self.start = start
+                least_error = error
+                self.start = start.name
             if error <= self.tuning.settled:
                 break
         if best is None:
             work.trial[:] = displaced
-            self.broken = broken
+            self.solve_failed = failed_before
             return False
         work.trial[:] = best
-        return self._accept_anew()
+        return self._accept_from_sides()
 
-    def _list_beginnings(
-        self, displaced: np.ndarray
-    ) -> Iterator[tuple[str, np.ndarray, Unfolding | None]]:
-        """Grids (2, ni+1, nj+1) to begin with, their names, and how they are unfolded if at all."""
+    def _list_starting_grids(self, displaced: np.ndarray) -> Iterator[StartingGrid]:
+        """Grids (2, ni+1, nj+1) to begin with, in the order of the table in theory R5."""
         work = self.work
-        straight = transfinite_grid(work.sides)
-        yield "transfinite", straight, None
-        yield "quasi-1d", quasi_1d_grid(work.sides, "i"), None
-        yield "quasi-1d", quasi_1d_grid(work.sides, "j"), None
-        for nodes, way in (
-            (straight, Unfolding.STRAIGHT),
-            (straight, Unfolding.GRADED_SPREAD),
-            (straight, Unfolding.GRADED),
+        transfinite = transfinite_grid(work.sides)
+        yield StartingGrid("transfinite", transfinite, None)
+        yield StartingGrid("quasi-1d", quasi_1d_grid(work.sides, "i"), None)
+        yield StartingGrid("quasi-1d", quasi_1d_grid(work.sides, "j"), None)
+        for nodes, unfolding in (
+            (transfinite, Unfolding.STRAIGHT),
+            (transfinite, Unfolding.GRADED_SPREAD),
+            (transfinite, Unfolding.GRADED),
             (displaced, Unfolding.GRADED),
             (displaced, Unfolding.EVEN),
-            (straight, Unfolding.EVEN),
-            (straight, Unfolding.EVEN_SPREAD),
+            (transfinite, Unfolding.EVEN),
+            (transfinite, Unfolding.EVEN_SPREAD),
         ):
-            yield "untangled", nodes.copy(), way
+            yield StartingGrid("untangled", nodes.copy(), unfolding)
 
     def _settle(self, nodes: np.ndarray) -> float:
         """Steps from valid nodes (2, ni+1, nj+1) into `work.trial`; the residual left, in cells.
@@ -256,30 +271,31 @@ class NewtonMove:
         """
         work = self.work
         work.trial[:] = nodes
-        self.broken = False
+        self.solve_failed = False
         self.quality = None
         self.triangles = -1
         self._polish(0.0, self.tuning.most_settling)
-        if self.broken or find_folded_cells(work.trial).size:
-            self.broken = False
+        if self.solve_failed or find_folded_cells(work.trial).size:
+            self.solve_failed = False
             work.trial[:] = nodes
             return np.inf
         return self.error
 
-    def _accept_anew(self) -> bool:
+    def _accept_from_sides(self) -> bool:
         """`_accept` of `work.trial`, against itself where the grid before is folded."""
         work = self.work
         old = work.trial if self.repairs else work.old
         self.ratio = np.inf
         return self._accept(work.compare_corners(work.trial, old))
 
-    def _check_look(self) -> None:
+    def _check_orientation(self) -> None:
+        """Raise `Folded` unless the block's orientation was chosen for untangling."""
         if not self.untangles:
             raise Folded
 
     def _begin(self) -> None:
         """Spacing of the part's sides, and their motion."""
-        self.broken = False
+        self.solve_failed = False
         self.work.begin(**self.arguments)
 
     def _advance(self) -> bool:
@@ -297,78 +313,81 @@ class NewtonMove:
         slow = SLOW_SIDE_FRACTION * tuning.fast_sides
         fast = tuning.fast_sides
         stiffness = compute_stiffness(work.old, work.sides, tuning.stiffness, slow, fast)
-        work.law = work.law._replace(stiffness=stiffness)
+        work.inputs = work.inputs._replace(stiffness=stiffness)
         work.find_symmetry()
-        moved = self.moved_ratio > tuning.start_ratio
-        folded = False
-        if moved:
-            done = self.iterations
+        # a Newton step from the displaced grid, or the prediction
+        can_start = self.displaced_ratio > tuning.start_ratio
+        if can_start:
+            iterations_before = self.iterations
             ratio = self._newton(work.base, work.old)
-            if self.iterations == done:
-                ratio = self.moved_ratio
-            if self.error > self._get_lost():
+            if self.iterations == iterations_before:
+                ratio = self.displaced_ratio
+            if self.error > self._find_lost_residual():
                 ratio = self._straighten(ratio)
-            folded = self.broken
+            is_folded = self.solve_failed
         else:
             ratio = self._predict()
-            folded = ratio == 0.0
-        if folded:
-            self._check_look()
-            if not ((not moved and self._follow()) or self._untangle()):
+            is_folded = ratio == 0.0
+        # unfolded if necessary
+        if is_folded:
+            self._check_orientation()
+            if not ((not can_start and self._follow()) or self._untangle()):
                 return False
             ratio = 0.0
-        settles = folded or work.spacing is not None  # a grid from elsewhere may be far from it
-        steps = self._polish(ratio, tuning.most_polish if settles else tuning.more_steps, settles)
-        if steps > 0 or self.start != "displacement" or not moved:
+        # more steps: a grid from elsewhere may be far from the minimum
+        settles = is_folded or work.spacing is not None
+        most_steps = tuning.most_polish if settles else tuning.more_steps
+        steps = self._polish(ratio, most_steps, settles)
+        if steps > 0 or self.start != "displacement" or not can_start:
             ratio = work.compare_corners(work.trial, work.old)
         return self._accept(ratio)
 
-    def _get_lost(self) -> float:
+    def _find_lost_residual(self) -> float:
         """Residual in cells from which the straight-line grid is tried.
 
         An interior that lags behind leaves its residual at the sides: relative to their length.
         """
-        inner = (self.work.ni - 1) * (self.work.nj - 1)
-        around = self.work.ni + self.work.nj
-        return self.tuning.lost / math.sqrt(inner / around)
+        inner_nodes = (self.work.ni - 1) * (self.work.nj - 1)
+        side_cells = self.work.ni + self.work.nj
+        return self.tuning.lost / math.sqrt(inner_nodes / side_cells)
 
     def _straighten(self, ratio: float) -> float:
         """Start from the straight-line grid instead, if that is valid and much closer."""
         work = self.work
         error = self.error
-        broken = self.broken
-        kept = work.trial.copy()
+        failed_before = self.solve_failed
+        trial_before = work.trial.copy()
         fill_quasi_1d(work.sides, work.base)
         if work.compare_corners(work.base, work.old) > 0.0:
-            straight = self._newton(work.base, work.base)
-            if not self.broken and self.error < 0.5 * error:
+            straight_ratio = self._newton(work.base, work.base)
+            if not self.solve_failed and self.error < 0.5 * error:
                 self.start = "quasi-1d"
-                return straight
-        work.trial[:] = kept
-        self.broken = broken
+                return straight_ratio
+        work.trial[:] = trial_before
+        self.solve_failed = failed_before
         return ratio
 
-    def _polish(self, ratio: float, most: int, afresh: bool = True) -> int:
+    def _polish(self, ratio: float, most_steps: int, settles: bool = True) -> int:
         """Newton steps from `work.trial` while the last kept too small a fraction `ratio` of a
         corner; returns their number.
 
-        After a fold (`afresh`) also until the residual is below `settled`, below the floor
-        where a spacing is given.
+        If the grid `settles`, also until the residual is below `settled`, below the floor where a
+        spacing is kept.
         """
         work = self.work
         tuning = self.tuning
         settled = tuning.settled if work.spacing is None else tuning.floor
-        for step in range(most):
-            good = ratio > tuning.start_ratio
-            if afresh:
-                good = good and self.error <= settled
-            if good and step >= tuning.newton_steps - 1:
+        for step in range(most_steps):
+            is_good = ratio > tuning.start_ratio
+            if settles:
+                is_good = is_good and self.error <= settled
+            if is_good and step >= tuning.newton_steps - 1:
                 return step
             work.base[:] = work.trial
             ratio = self._newton(work.base, work.base)
-            if self.broken:
+            if self.solve_failed:
                 return step + 1
-        return most
+        return most_steps
 
     def _predict(self) -> float:
         """Extend the boundary's motion inward by the Hessian of the old grid.
@@ -376,15 +395,15 @@ class NewtonMove:
         Returns the least corner ratio of the step to `work.trial`, 0 if that is not valid.
         """
         work = self.work
-        least = self.tuning.step_ratio
+        step_ratio = self.tuning.step_ratio
         work.assemble(work.old)
         self._solve(work.base - work.old)
         np.add(work.old, work.change, out=work.trial)
         copy_sides(work.sides, work.trial)
         ratio = work.compare_corners(work.trial, work.old)
-        if ratio > least:
+        if ratio > step_ratio:
             return ratio
-        return self._newton(work.base, work.base) if self.moved_ratio > least else 0.0
+        return self._newton(work.base, work.base) if self.displaced_ratio > step_ratio else 0.0
 
     def _follow(self) -> bool:
         """Follow the prediction as far as it keeps enough of every corner, renew it there, and so
@@ -394,37 +413,37 @@ class NewtonMove:
         """
         work = self.work
         predicted = work.trial.copy()
-        here = work.old.copy()
-        left = np.empty_like(here)
+        reached = work.old.copy()
+        remaining = np.empty_like(reached)
         for _ in range(self.tuning.most_parts):
-            part = self._go_along(here)
-            if part == 1.0:
+            fraction = self._go_along(reached)
+            if fraction == 1.0:
                 self.start = "followed"
                 return True
-            if part == 0.0:
+            if fraction == 0.0:
                 break
-            here[:] = work.trial
-            fill_displacement(here, work.sides, left)
-            work.assemble(here)
-            self._solve(left)
-            if self.broken:
+            reached[:] = work.trial
+            fill_displacement(reached, work.sides, remaining)
+            work.assemble(reached)
+            self._solve(remaining)
+            if self.solve_failed:
                 break
         work.trial[:] = predicted
         return False
 
-    def _go_along(self, here: np.ndarray) -> float:
-        """`work.trial` = a part of `work.change` away from a valid grid, by which no corner loses
-        too much; returns the part, 0 where even a short one would."""
+    def _go_along(self, reached: np.ndarray) -> float:
+        """`work.trial` = a fraction of `work.change` away from a valid grid, by which no corner
+        loses too much; returns the fraction, 0 where even a small one would."""
         work = self.work
-        part = 1.0
-        while part >= LEAST_FOLLOWED_PART:
-            np.multiply(work.change, part, out=work.trial)
-            work.trial += here
-            if part == 1.0:
+        fraction = 1.0
+        while fraction >= LEAST_FOLLOWED_FRACTION:
+            np.multiply(work.change, fraction, out=work.trial)
+            work.trial += reached
+            if fraction == 1.0:
                 copy_sides(work.sides, work.trial)
-            if work.compare_corners(work.trial, here) > self.tuning.step_ratio:
-                return part
-            part *= 0.5
+            if work.compare_corners(work.trial, reached) > self.tuning.step_ratio:
+                return fraction
+            fraction *= 0.5
         return 0.0
 
     def _newton(self, base, old) -> float:
@@ -437,7 +456,7 @@ class NewtonMove:
         work.assemble(base)
         if self._solve(None) == 0:
             work.trial[:] = base
-            return 0.0 if self.broken else 1.0
+            return 0.0 if self.solve_failed else 1.0
         np.add(base, work.change, out=work.trial)
         ratio = work.compare_corners(work.trial, old)
         return ratio if ratio > self.tuning.step_ratio else self._search(base, old)
@@ -450,48 +469,49 @@ class NewtonMove:
         """
         work = self.work
         barrier = work.compute_barrier(base)
-        before, _ = work.compute_energy(base, 0.0, barrier)
-        part = 1.0
-        while part >= LEAST_PART:
-            np.multiply(work.change, part, out=work.trial)
+        energy_before, _ = work.compute_energy(base, 0.0, barrier)
+        fraction = 1.0
+        while fraction >= LEAST_STEP_FRACTION:
+            np.multiply(work.change, fraction, out=work.trial)
             work.trial += base
             shorten_steps(base, work.trial, old, self.tuning.step_ratio, work.shortening)
-            if work.compute_energy(work.trial, 0.0, barrier)[0] < before:
+            if work.compute_energy(work.trial, 0.0, barrier)[0] < energy_before:
                 return work.compare_corners(work.trial, old)
-            part *= 0.5
+            fraction *= 0.5
         work.trial[:] = base
         return work.compare_corners(base, old)
 
     def _solve(self, guess) -> int:
         """Fill `work.change`; returns the iterations, sets `error`, the initial residual in cells.
 
-        Sets `broken` if the line solve overflows because corners are too sharp: a residual that is
-        not finite, negative or zero does not indicate a minimum.
+        Sets `solve_failed` if the line solve overflows because corners are too sharp: a residual
+        that is not finite, negative or zero does not indicate a minimum.
         """
         work = self.work
         tuning = self.tuning
         scale = work.sigma * (work.ni - 1) * (work.nj - 1)
         floor = max(tuning.floor, ROUND_OFF_RESIDUAL) ** 2 * scale
         if guess is None:
-            done, first, last = work.solve(tuning.tolerance, floor, tuning.max_iterations)
+            iterations, first, last = work.solve(tuning.tolerance, floor, tuning.max_iterations)
         else:
-            done, first, last = work.solve(
+            iterations, first, last = work.solve(
                 tuning.exact_tolerance, floor, tuning.predict_iterations, guess
             )
-        self.iterations += done
-        self.broken = not (first >= -floor and np.isfinite(first) and np.isfinite(last))
-        self.broken |= first == 0.0 and bool(work.r.any())
-        if self.broken:
+        self.iterations += iterations
+        is_valid = first >= -floor and np.isfinite(first) and np.isfinite(last)
+        self.solve_failed = not is_valid
+        self.solve_failed |= first == 0.0 and bool(work.r.any())
+        if self.solve_failed:
             self.error = np.inf
-            return done
+            return iterations
         self.error = float(np.sqrt(max(first, 0.0) / scale))
         self.residual = max(self.residual, self.error)
-        return done
+        return iterations
 
     def _accept(self, ratio: float) -> bool:
         """Report the least ratio; True when `work.trial` is valid."""
         self.ratio = min(self.ratio, ratio)
-        if not ratio > 0.0 or self.broken:
+        if not ratio > 0.0 or self.solve_failed:
             return False
         return ratio > DOUBTFUL_CORNER_RATIO or not find_folded_cells(self.work.trial).size
 
@@ -500,9 +520,9 @@ class NewtonMove:
         work = self.work
         self.rescues += 1
         self.start = "untangled"
-        worst = work.compute_energy(work.trial, 1.0)[1]
-        moved = work.compute_energy(work.base, 1.0)[1]
-        if moved < worst:
+        trial_least_area = work.compute_energy(work.trial, 1.0)[1]
+        displaced_least_area = work.compute_energy(work.base, 1.0)[1]
+        if displaced_least_area < trial_least_area:
             work.base[:] = work.trial
         if not untangle(work, work.base, self.tuning):
             return False

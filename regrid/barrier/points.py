@@ -14,10 +14,10 @@ from shockgrid.regrid.errors import RegridFailure
 from shockgrid.regrid.measure.corners import find_excluded_corners, find_folded_cells
 from shockgrid.regrid.sides import SIDE_NAMES, compute_area, get_side
 
-# of the edges at a point, at which it is opened, in turn
-OPENED_PARTS = (1e-2, 1e-4)
+# fractions of the edges at a point at which it is opened, tried in turn
+OPENED_FRACTIONS = (1e-2, 1e-4)
 # the same where opposite sides are points: their lines alone define the lengths between them
-PARTS_OF_TWO_POINTS = (0.1, *OPENED_PARTS)
+FRACTIONS_OF_TWO_POINTS = (0.1, *OPENED_FRACTIONS)
 
 
 def find_points(nodes: np.ndarray) -> tuple[str, ...]:
@@ -42,19 +42,23 @@ def find_points(nodes: np.ndarray) -> tuple[str, ...]:
     return tuple(points)
 
 
-def open_points(nodes: np.ndarray, points: tuple[str, ...], part: float) -> np.ndarray:
-    """A copy of `nodes` (2, ni+1, nj+1) with short lines in place of sides that are points."""
+def open_points(nodes: np.ndarray, points: tuple[str, ...], fraction: float) -> np.ndarray:
+    """A copy of `nodes` (2, ni+1, nj+1) with short lines in place of sides that are points.
+
+    Their ends are at a `fraction` of the first edges of the two adjacent sides.
+    """
     opened = nodes.copy()
     for name in points:
         view = opened if name[0] == "i" else opened.transpose(0, 2, 1)
         view = view[:, ::-1] if name.endswith("max") else view
         place = view[0] + 1j * view[1]
         point = place[0, 0]
-        ends = point + part * (place[1, [0, -1]] - point)
-        far = place[-1]
-        shape = np.linspace(0.0, 1.0, far.size)
-        if far[0] != far[-1]:
-            shape = (far - far[0]) / (far[-1] - far[0])
+        ends = point + fraction * (place[1, [0, -1]] - point)
+        # a copy of the opposite side between the two ends
+        opposite = place[-1]
+        shape = np.linspace(0.0, 1.0, opposite.size)
+        if opposite[0] != opposite[-1]:
+            shape = (opposite - opposite[0]) / (opposite[-1] - opposite[0])
         line = ends[0] + shape * (ends[1] - ends[0])
         view[:, 0] = line.real, line.imag
     return opened

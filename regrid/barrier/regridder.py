@@ -19,16 +19,16 @@ import numpy as np
 
 from shockgrid.regrid.barrier.newton_move import Folded, NewtonMove
 from shockgrid.regrid.barrier.points import (
-    OPENED_PARTS,
-    PARTS_OF_TWO_POINTS,
+    FRACTIONS_OF_TWO_POINTS,
+    OPENED_FRACTIONS,
     close_points,
     find_points,
     open_points,
 )
-from shockgrid.regrid.barrier.side_laws import fill_family_weights
+from shockgrid.regrid.barrier.side_inputs import fill_family_weights
 from shockgrid.regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
-from shockgrid.regrid.barrier.turning import Look, choose_look, is_convex
-from shockgrid.regrid.barrier.workspace import Workspace, find_bend, is_bent
+from shockgrid.regrid.barrier.turning import Orientation, choose_orientation, is_convex
+from shockgrid.regrid.barrier.workspace import Workspace, find_spacing_departure, has_departures
 from shockgrid.regrid.errors import BadInput, RegridFailure
 from shockgrid.regrid.measure.crossings import find_crossing
 from shockgrid.regrid.measure.cuts import Cuts, take_cuts
@@ -41,7 +41,7 @@ from shockgrid.regrid.measure.faults import (
 )
 from shockgrid.regrid.protocol import RegridResult
 from shockgrid.regrid.sides import compute_area, copy_sides, get_sides
-from shockgrid.regrid.symmetry import turn_bend
+from shockgrid.regrid.symmetry import turn_departure
 
 # families whose weights differ by less are ranked by the block's shape
 EVEN_WEIGHT_DIFFERENCE = 1e-6
@@ -49,32 +49,33 @@ SERIAL_NODES = 6400  # smaller blocks stay on one thread
 
 
 class _NoGrid(Exception):
-    """No grid was found; `trial` came closest, in a workspace's frame; `flat`: it is too sharp."""
+    """No grid was found; `trial` came closest, in a workspace's frame; or it is `too_sharp`."""
 
-    def __init__(self, trial: np.ndarray, transposed: bool, flat: bool):
+    def __init__(self, trial: np.ndarray, transposed: bool, too_sharp: bool):
         super().__init__()
         self.trial = trial
         self.transposed = transposed
-        self.flat = flat
+        self.too_sharp = too_sharp
 
-    def turn_back(self, look: Look) -> tuple[np.ndarray, bool, bool]:
+    def turn_back(self, orientation: Orientation) -> tuple[np.ndarray, bool, bool]:
         """The same of the block as it was before it was turned."""
-        turn = look.turn.exchange() if self.transposed else look.turn
+        turn = orientation.turn.exchange() if self.transposed else orientation.turn
         trial = turn.apply(self.trial)
-        return (trial[::-1] if turn.mirrors else trial), self.transposed, self.flat
+        return (trial[::-1] if turn.mirrors else trial), self.transposed, self.too_sharp
 
 
-class Given(NamedTuple):
-    """What a regrid is given: the grid before and the new sides (2, ni+1, nj+1) in m, the cells'
-    speeds of sound (ni, nj) in m/s or None, the least limiting rate in 1/s, and the grid whose
-    spacing is kept or None.
+class RegridRequest(NamedTuple):
+    """What a regrid is asked for.
+
+    The grid before and the new sides (2, ni+1, nj+1) in m, the cells' speeds of sound (ni, nj) in
+    m/s or None, the least limiting rate in 1/s, and the grid whose spacing is kept or None.
     """
 
     previous: np.ndarray
     boundary: np.ndarray
     sound_speed: np.ndarray | None
     least_limiting_rate: float
-    first: np.ndarray | None
+    first_grid: np.ndarray | None
 
 
 class BarrierRegridder:
@@ -97,12 +98,12 @@ class BarrierRegridder:
     its spacing along themselves alone (R4.9). `cuts` are lines that the boundary runs along twice,
     out and back, the block on both sides: a side and two of its nodes each, such as ("j_min", 0,
     80). The wake of a C grid, whose nodes are the same from both ends of a side, and a ring that is
-    closed on itself are seen without being told.
+    closed on itself are detected.
     """
 
     # the options that are fields of `Tuning`, and their types
     numbers: ClassVar[dict[str, str]] = {
-        one.name: str(one.type) for one in fields(Tuning) if one.name in OPTIONS
+        field.name: str(field.type) for field in fields(Tuning) if field.name in OPTIONS
     }
 
     def __init__(
@@ -125,13 +126,13 @@ class BarrierRegridder:
                 f"barrier regridder: edge_lengths '{edge_lengths}' is neither 'conditional' "
                 "nor 'unit'"
             )
-        given = {name: value for name, value in numbers.items() if value is not None}
-        self.tuning = replace(DEFAULT, **given)
+        set_numbers = {name: value for name, value in numbers.items() if value is not None}
+        self.tuning = replace(DEFAULT, **set_numbers)
         _check_tuning(self.tuning)
         self.conditional = edge_lengths == "conditional"
         if not isinstance(curves, bool):
             raise BadInput(f"barrier regridder: curves = {curves!r}; it must be true or false")
-        self.family = _family_weights(family)
+        self.family = _take_family(family)
         self.curved = curves and self.family is None
         self.spacing = _choose_spacing(spacing, first_grid is not None, self.family)
         if self.spacing != "sides" and not (method == "newton" and self.conditional):
@@ -144,13 +145,13 @@ class BarrierRegridder:
                 self.tuning, floor=min(self.tuning.floor, self.tuning.given_floor)
             )
         self.first_grid: np.ndarray | None = None
-        self.bend: np.ndarray | None = None
+        self.spacing_departure: np.ndarray | None = None
         if first_grid is not None:
             self.first_grid = convert_nodes(first_grid, "first_grid").copy()
             if self.spacing == "lines":
-                bend = find_bend(self.first_grid)
-                if is_bent(bend):  # evenly spaced lines need no stored spacing
-                    self.bend = bend
+                departure = find_spacing_departure(self.first_grid)
+                if has_departures(departure):  # evenly spaced lines need no stored spacing
+                    self.spacing_departure = departure
             elif not is_convex(self.first_grid):
                 raise BadInput(
                     "barrier regridder: first_grid has folded cells, whose spacing cannot be kept"
@@ -164,7 +165,7 @@ class BarrierRegridder:
             from shockgrid.regrid.barrier.sweeps import Sweeps
 
             self._sweeps = Sweeps(
-                given.get("epsilon", 1e-2), edge_lengths=edge_lengths, family=family
+                set_numbers.get("epsilon", 1e-2), edge_lengths=edge_lengths, family=family
             )
 
     works_in_place = True  # into `boundary`, whose sides are preserved bitwise
@@ -201,46 +202,51 @@ class BarrierRegridder:
         unit = find_unit(previous)
         if unit != 1.0:  # eighth powers of lengths would not be numbers
             return self._regrid_in(unit, previous, boundary, sound_speed, least_limiting_rate, into)
-        given = Given(previous, boundary, sound_speed, float(least_limiting_rate), None)
+        request = RegridRequest(previous, boundary, sound_speed, float(least_limiting_rate), None)
         try:
-            return self._regrid_given(given, into)
+            return self._regrid_checked(request, into)
         except RegridFailure:
             points = find_points(previous), find_points(boundary)
             if points == ((), ()):
                 raise
-        return self._regrid_opened(given, into, *points)
+        return self._regrid_opened(request, into, *points)
 
-    def _regrid_given(self, given: Given, into) -> RegridResult:
+    def _regrid_checked(self, request: RegridRequest, into) -> RegridResult:
         """`regrid` of checked arrays."""
         if self.spacing == "given":
-            given = given._replace(first=self._find_first(given.previous))
+            request = request._replace(first_grid=self._find_first_grid(request.previous))
         try:
-            return self._move(given, into, untangles=False)
+            return self._move(request, into, untangles=False)
         except Folded:
-            return self._untangle(given, into)
+            return self._untangle(request, into)
         except _NoGrid as end:
             raise explain_failure(
-                given.boundary, end.trial, end.transposed, end.flat, cuts=self.cuts
+                request.boundary, end.trial, end.transposed, end.too_sharp, cuts=self.cuts
             ) from None
 
     def _regrid_opened(
-        self, given: Given, into, before: tuple[str, ...], after: tuple[str, ...]
+        self,
+        request: RegridRequest,
+        into,
+        points_before: tuple[str, ...],
+        points_after: tuple[str, ...],
     ) -> RegridResult:
-        """`regrid` of a block whose sides `before` and `after` the motion are points."""
-        boundary = given.boundary
-        failure = RegridFailure("cells at this point fold", side=(after or before)[0])
-        for part in OPENED_PARTS if len(after) < 2 else PARTS_OF_TWO_POINTS:
-            opened = given._replace(
-                previous=open_points(given.previous, before, part),
-                boundary=open_points(boundary, after, part),
+        """`regrid` of a block in which these sides are points before and after the motion."""
+        boundary = request.boundary
+        side = (points_after or points_before)[0]
+        failure = RegridFailure("cells at this point fold", side=side)
+        for fraction in OPENED_FRACTIONS if len(points_after) < 2 else FRACTIONS_OF_TWO_POINTS:
+            opened = request._replace(
+                previous=open_points(request.previous, points_before, fraction),
+                boundary=open_points(boundary, points_after, fraction),
             )
             try:
-                result = self._regrid_given(opened, None)
-            except RegridFailure as found:
-                failure = found
+                result = self._regrid_checked(opened, None)
+            except RegridFailure as raised:
+                failure = raised
                 continue
             nodes = result.nodes
-            exempt = close_points(nodes, boundary, after)
+            exempt = close_points(nodes, boundary, points_after)
             if exempt is None:
                 continue
             if into is not None:
@@ -273,34 +279,37 @@ class BarrierRegridder:
         if self.spacing == "given" and self.first_grid is None and is_convex(nodes):
             self.first_grid = nodes.copy()
 
-    def _find_first(self, previous: np.ndarray) -> np.ndarray | None:
+    def _find_first_grid(self, previous: np.ndarray) -> np.ndarray | None:
         """The grid whose spacing is kept."""
         self.take_first_grid(previous)
         self._check_shape(previous.shape)
         return self.first_grid
 
-    def _move(self, given: Given, into, untangles: bool, repairs: bool = False) -> RegridResult:
+    def _move(
+        self, request: RegridRequest, into, untangles: bool, repairs: bool = False
+    ) -> RegridResult:
         """`regrid` of checked arrays; raises `_NoGrid`, and `Folded` unless it `untangles`.
 
         `repairs`: the previous grid is folded.
         """
-        previous, boundary, sound_speed, least_limiting_rate, first = given
+        previous, boundary, sound_speed, least_limiting_rate, first_grid = request
+        # the frame of the workspace
         weights, transposed = self._weigh(boundary)
         ki, kj = (weights[1], weights[0]) if transposed else (weights[0], weights[1])
         mirrored = (compute_area(previous) < 0.0) != transposed
         work = self._workspace(previous.shape, transposed)
-        work.take(previous, boundary, transposed, mirrored, sound_speed, into, first)
+        work.take(previous, boundary, transposed, mirrored, sound_speed, into, first_grid)
         work.least_limiting_rate = least_limiting_rate
         move = NewtonMove(
             self.tuning, work, untangles, repairs, conditional=self.conditional, ki=float(ki),
             kj=float(kj), cost=sound_speed is not None, curved=self.curved,
         )  # fmt: skip
-        checked = self.meets_itself or untangles  # a block is untangled after a first try
-        # the sides neither cross nor touch, but for cuts
-        if self.cuts and not checked:
-            checked = find_crossing(boundary, self.cuts) is None
-        simple = work.block.area > 0.0 and (checked or (not self.cuts and work.is_simple))
-        if not (simple and move.is_settled()):
+        # the sides neither cross nor touch, but for cuts; a block is untangled after a first try
+        is_checked = self.meets_itself or untangles
+        if self.cuts and not is_checked:
+            is_checked = find_crossing(boundary, self.cuts) is None
+        is_simple = work.block.area > 0.0 and (is_checked or (not self.cuts and work.is_simple))
+        if not (is_simple and move.is_settled()):
             if not move.estimate < np.inf:  # otherwise all nodes are finite
                 if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                     raise explain_failure(boundary)
@@ -308,72 +317,93 @@ class BarrierRegridder:
                     raise BadInput(
                         "regrid: the previous grid has nodes that are not finite numbers"
                     )
-            if not simple:
+            if not is_simple:
                 raise explain_failure(boundary, previous=previous, cuts=self.cuts)
             if not move.run():
-                raise _NoGrid(work.trial, transposed, move.broken)
+                raise _NoGrid(work.trial, transposed, move.solve_failed)
         report = move.report()
         if report.quality and mirrored != transposed:  # of a clockwise grid
             report = replace(report, quality=None)
         return RegridResult(work.give(), report)
 
-    def _weigh(self, boundary):
+    def _weigh(self, boundary) -> tuple[Any, bool]:
         """The weights of the two families, and whether the lines i = const are the heavier one."""
-        weights = self.family
+        weights: Any = self.family
         if weights is None:
             weights = np.empty(2)
             fill_family_weights(boundary, weights)
         return weights, _runs_along_j(weights, boundary)
 
-    def _untangle(self, given: Given, into) -> RegridResult:
+    def _untangle(self, request: RegridRequest, into) -> RegridResult:
         """`_move` as its mirror image is moved; a symmetric block stays symmetric."""
-        previous, boundary, sound_speed, least_limiting_rate, first = given
-        cells = [] if sound_speed is None else [sound_speed]
+        boundary = request.boundary
+        # the same orientation as the mirror image
+        cell_values = [] if request.sound_speed is None else [request.sound_speed]
         transposed = self._weigh(boundary)[1]
-        look = choose_look(previous, boundary, cells, transposed, self.bend)
-        before = look.turn_grid(previous)
-        after = before.copy()
-        copy_sides(look.turn_grid(boundary), after)
-        sound = None if sound_speed is None else look.turn_cells(sound_speed)
-        if first is not None:
-            look = look._replace(same=())
-            first = look.turn_grid(first)
-        repairs = not is_convex(before)
-        if repairs and first is not None:  # it has the spacing that is to be kept, and no folds
-            before = first
+        departure = self.spacing_departure
+        orientation = choose_orientation(
+            request.previous, boundary, cell_values, transposed, departure
+        )
+        turned = self._turn_request(request, orientation)
+        if turned.first_grid is not None:
+            orientation = orientation._replace(symmetries=())
+        repairs = not is_convex(turned.previous)
+        if repairs and turned.first_grid is not None:
+            # it has the spacing that is to be kept, and no folds
+            turned = turned._replace(previous=turned.first_grid)
             repairs = False
-        given = Given(before, after, sound, least_limiting_rate, first)
-        if self.bend is not None:
-            self._workspace(before.shape, False).take_laws(turn_bend(look.turn, self.bend))
+        # moved, with the departure of its lines turned as long as that takes
+        work = self._workspace(turned.previous.shape, False)
+        if departure is not None:
+            work.keep_departure(turn_departure(orientation.turn, departure))
         try:
-            result = self._move_evenly(look, given, repairs) if look.same else None
-            result = result or self._move(given, None, untangles=True, repairs=repairs)
+            result = None
+            if orientation.symmetries:
+                result = self._move_evenly(orientation, turned, repairs)
+            result = result or self._move(turned, None, untangles=True, repairs=repairs)
         except _NoGrid as end:
-            raise explain_failure(boundary, *end.turn_back(look), cuts=self.cuts) from None
+            raise explain_failure(boundary, *end.turn_back(orientation), cuts=self.cuts) from None
         finally:
-            if self.bend is not None:
-                self._workspace(before.shape, False).take_laws(self.bend)
-        nodes = look.turn_grid(result.nodes)
+            if departure is not None:
+                work.keep_departure(departure)
+        nodes = orientation.turn_grid(result.nodes)
         copy_sides(boundary, nodes)  # zeros may have changed their sign
         if into is not None:
             into[:] = nodes
             nodes = into
         return replace(result, nodes=nodes)
 
-    def _move_evenly(self, look: Look, given: Given, repairs: bool) -> RegridResult | None:
+    @staticmethod
+    def _turn_request(request: RegridRequest, orientation: Orientation) -> RegridRequest:
+        """The same request of the block as it is in an orientation."""
+        previous = orientation.turn_grid(request.previous)
+        boundary = previous.copy()
+        copy_sides(orientation.turn_grid(request.boundary), boundary)
+        sound, first_grid = request.sound_speed, request.first_grid
+        return request._replace(
+            previous=previous,
+            boundary=boundary,
+            sound_speed=None if sound is None else orientation.turn_cells(sound),
+            first_grid=None if first_grid is None else orientation.turn_grid(first_grid),
+        )
+
+    def _move_evenly(
+        self, orientation: Orientation, request: RegridRequest, repairs: bool
+    ) -> RegridResult | None:
         """`_move` of a turned block that is symmetric up to rounding, as if it were exactly so."""
-        before, after, sound, _, _ = given
-        even = given._replace(
-            previous=look.even_out(before, before),
-            boundary=look.even_out(after, after),
-            sound_speed=None if sound is None else look.even_out_cells(sound),
+        boundary = request.boundary
+        sound = request.sound_speed
+        even = request._replace(
+            previous=orientation.even_out(request.previous, request.previous),
+            boundary=orientation.even_out(boundary, boundary),
+            sound_speed=None if sound is None else orientation.even_out_cells(sound),
         )
         try:
             result = self._move(even, None, untangles=True, repairs=repairs)
         except (_NoGrid, RegridFailure):
             return None
-        for nodes in (look.even_out(result.nodes, after), result.nodes):
-            copy_sides(after, nodes)
+        for nodes in (orientation.even_out(result.nodes, boundary), result.nodes):
+            copy_sides(boundary, nodes)
             if is_convex(nodes):
                 return replace(result, nodes=nodes)
         return None
@@ -386,20 +416,21 @@ class BarrierRegridder:
         boundary = convert_nodes(boundary, "boundary")
         sound_speed = _take_sound(sound_speed, boundary)
         work = self._workspace(boundary.shape, False)
-        first = self.first_grid if self.spacing == "given" else None
+        first_grid = self.first_grid if self.spacing == "given" else None
         mirrored = compute_area(boundary) < 0.0
-        work.take(None, boundary, False, mirrored, sound_speed, first=first)
+        work.take(None, boundary, False, mirrored, sound_speed, first_grid=first_grid)
         work.least_limiting_rate = 0.0
         work.begin(self.conditional, 1.0, 0.0, replace(self.tuning, cost_weight=1.0), cost=True)
-        return float(np.sqrt(2.0 / work.law.cost_scale))
+        return float(np.sqrt(2.0 / work.inputs.cost_scale))
 
     def _check_shape(self, shape: tuple[int, ...]) -> None:
         """BadInput where the first grid has another shape."""
         if self.first_grid is not None and self.first_grid.shape != shape:
-            first, block = (f"{n - 1} x {m - 1}" for _, n, m in (self.first_grid.shape, shape))
+            shapes = self.first_grid.shape, shape
+            first_cells, block_cells = (f"{ni_1 - 1} x {nj_1 - 1}" for _, ni_1, nj_1 in shapes)
             raise BadInput(
-                f"barrier regridder: the first grid has {first} cells, the block {block}; both "
-                "must be the same"
+                f"barrier regridder: the first grid has {first_cells} cells, the block "
+                f"{block_cells}; both must be the same"
             )
 
     def _workspace(self, shape, transposed) -> Workspace:
@@ -410,8 +441,8 @@ class BarrierRegridder:
             if self.spacing == "lines":
                 self._check_shape(shape)
             self._workspaces[key] = Workspace(*key, threads, self.tuning, shared=True)
-            if self.bend is not None:
-                self._workspaces[key].take_laws(self.bend)
+            if self.spacing_departure is not None:
+                self._workspaces[key].keep_departure(self.spacing_departure)
         return self._workspaces[key]
 
 
@@ -428,26 +459,27 @@ def _take_sound(sound_speed, nodes: np.ndarray) -> np.ndarray:
 
 def _check_tuning(tuning: Tuning) -> None:
     """Raise BadInput for invalid parameters of the functional."""
-    for name, condition, good in (
+    for name, condition, holds in (
         ("epsilon", "positive", tuning.epsilon > 0.0),
         ("strengthening", "1 or more", tuning.strengthening >= 1.0),
         ("corner_weight", "finite and 1 or more", 1.0 <= tuning.corner_weight < np.inf),
         ("cost_weight", "finite and not negative", 0.0 <= tuning.cost_weight < np.inf),
         ("coarse_from", "a count of cells, 0 or more", tuning.coarse_from >= 0.0),
     ):
-        if not good:
+        if not holds:
             raise BadInput(f"barrier regridder: {name} {getattr(tuning, name)} must be {condition}")
 
 
-def _choose_spacing(spacing: str | None, first: bool, family) -> str:
+def _choose_spacing(spacing: str | None, has_first_grid: bool, family) -> str:
     """`spacing`, by default "lines" with a first grid and family "i", "given" with other families,
     "sides" without a first grid; BadInput for other words."""
     if spacing is None:
-        straight = family == (1.0, 0.0)
-        return ("lines" if straight else "given") if first else "sides"
+        if not has_first_grid:
+            return "sides"
+        return "lines" if family == (1.0, 0.0) else "given"
     if spacing not in ("sides", "given"):
         raise BadInput(f"barrier regridder: spacing {spacing!r} is neither 'sides' nor 'given'")
-    if spacing == "sides" and first:
+    if spacing == "sides" and has_first_grid:
         raise BadInput(
             "barrier regridder: spacing = 'sides' keeps nothing of a first grid; leave one of them "
             "out"
@@ -455,7 +487,8 @@ def _choose_spacing(spacing: str | None, first: bool, family) -> str:
     return spacing
 
 
-def _family_weights(family):
+def _take_family(family) -> tuple[float, float] | None:
+    """The weights of the two families, None for those that the sides imply; else BadInput."""
     if family == "auto":
         return None
     if family == "i":

@@ -33,20 +33,22 @@ UPRIGHT = False, False  # a frame: is it transposed, is it mirrored?
 
 
 @inlined
-def take_row(nodes, i, mirrored, low, count, rows, Z):
-    """x and y of row i of a grid into two rows of Z, `count` columns from `low` on; exchanged if
-    the grid is `mirrored`."""
-    to_x, to_y = rows
+def load_row(nodes, i, mirrored, low, count, rows, Z):
+    """Load x and y of row i of a grid into two rows of Z; exchanged if the grid is `mirrored`.
+
+    `count` columns from `low` on; `rows`: where the two rows of Z begin.
+    """
+    start_x, start_y = rows
     x, y = nodes[1 if mirrored else 0], nodes[0 if mirrored else 1]
     row_x, row_y = x[i, low : low + count], y[i, low : low + count]
     for col in range(count):
-        Z[to_x + col] = row_x[col]
-        Z[to_y + col] = row_y[col]
+        Z[start_x + col] = row_x[col]
+        Z[start_y + col] = row_y[col]
 
 
 @inlined
 def take_edges(rows, col, Z):
-    """Edges of a cell between two rows of nodes: along i (low, high), then along j (near, far).
+    """Edges of a cell between two rows of nodes: along i (low, up), then along j (near, far).
 
     `rows`: where x and y of the first row lie in Z, and of the next one.
     """
@@ -65,6 +67,57 @@ def round_up(count):
     return (count + 7) // 8 * 8
 
 
+@inlined
+def replace_block_corner(first, last, nj, i, cells, Z):
+    """Give the block's own corners in row i of cells the areas of the corner next to them."""
+    low_row, up_row = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
+    for end in range(2):
+        if (first == 0 and end == 0) or (last == nj and end == 1):
+            col = 0 if end == 0 else cells - 1
+            row = low_row if end == 0 else up_row
+            next_row = up_row if end == 0 else low_row
+            Z[row + col] = Z[next_row + col]
+            Z[row + OLD_1 - AREA_1 + col] = Z[next_row + OLD_1 - AREA_1 + col]
+
+
+@inlined
+def find_least_ratio(new_areas, old_areas):
+    """The least of four ratios of areas with one division; old areas are positive."""
+    a1, a2, a3, a4 = new_areas
+    b1, b2, b3, b4 = old_areas
+    first_is_less, third_is_less = a1 * b2 < a2 * b1, a3 * b4 < a4 * b3
+    new_12 = a1 if first_is_less else a2
+    old_12 = b1 if first_is_less else b2
+    new_34 = a3 if third_is_less else a4
+    old_34 = b3 if third_is_less else b4
+    is_less = new_12 * old_34 < new_34 * old_12
+    return (new_12 if is_less else new_34) / (old_12 if is_less else old_34)
+
+
+@inlined
+def keep_least_corner(col, Z):
+    """Keep the least area and the least ratio to the old one of a column's corners so far."""
+    a1 = Z[AREA_1 + col]
+    a2 = Z[AREA_2 + col]
+    a3 = Z[AREA_3 + col]
+    a4 = Z[AREA_4 + col]
+    b1 = Z[OLD_1 + col]
+    b2 = Z[OLD_2 + col]
+    b3 = Z[OLD_3 + col]
+    b4 = Z[OLD_4 + col]
+    not_a_number = (((a1 + a2) + (a3 + a4)) + ((b1 + b2) + (b3 + b4))) * 0.0  # 0, or NaN
+    least_ratio = Z[LEAST_RATIO + col]
+    least_area = Z[LEAST_AREA + col]
+    least_area = a1 if a1 < least_area else least_area
+    least_area = a2 if a2 < least_area else least_area
+    least_area = a3 if a3 < least_area else least_area
+    least_area = a4 if a4 < least_area else least_area
+    ratio = find_least_ratio((a1, a2, a3, a4), (b1, b2, b3, b4))
+    Z[LEAST_RATIO + col] = ratio if ratio < least_ratio else least_ratio
+    Z[LEAST_AREA + col] = least_area
+    Z[NOT_A_NUMBER + col] += not_a_number
+
+
 @kernel(allocates=False)
 def measure_corners(trial, old, first, last, Z):
     """Least ratio of trial to old corner area, and least trial area; (0, 0) where any is NaN.
@@ -80,8 +133,8 @@ def measure_corners(trial, old, first, last, Z):
     for i in range(ni):
         # corner areas of a row of cells, new and old
         for grid, rows in ((trial, NEW_ROWS), (old, OLD_ROWS)):
-            take_row(grid, i, False, first, cells + 1, rows[:2], Z)
-            take_row(grid, i + 1, False, first, cells + 1, rows[2:], Z)
+            load_row(grid, i, False, first, cells + 1, rows[:2], Z)
+            load_row(grid, i + 1, False, first, cells + 1, rows[2:], Z)
         for col in range(round_up(cells)):
             Z[AREA_1 + col], Z[AREA_2 + col], Z[AREA_3 + col], Z[AREA_4 + col] = find_areas(
                 *take_edges(NEW_ROWS, col, Z)
@@ -89,53 +142,64 @@ def measure_corners(trial, old, first, last, Z):
             Z[OLD_1 + col], Z[OLD_2 + col], Z[OLD_3 + col], Z[OLD_4 + col] = find_areas(
                 *take_edges(OLD_ROWS, col, Z)
             )
-        # the block's own corners do not count: each as its neighbour
-        corner_low, corner_up = (AREA_1, AREA_2) if i == 0 else (AREA_4, AREA_3)
+        # the block's own corners do not count
         if i == 0 or i == ni - 1:
-            for end in range(2):
-                if (first == 0 and end == 0) or (last == nj and end == 1):
-                    col = 0 if end == 0 else cells - 1
-                    row = corner_low if end == 0 else corner_up
-                    other = corner_up if end == 0 else corner_low
-                    Z[row + col] = Z[other + col]
-                    Z[row + OLD_1 - AREA_1 + col] = Z[other + OLD_1 - AREA_1 + col]
+            replace_block_corner(first, last, nj, i, cells, Z)
         # least area and ratio by column
         for col in range(cells):
-            a1 = Z[AREA_1 + col]
-            a2 = Z[AREA_2 + col]
-            a3 = Z[AREA_3 + col]
-            a4 = Z[AREA_4 + col]
-            b1 = Z[OLD_1 + col]
-            b2 = Z[OLD_2 + col]
-            b3 = Z[OLD_3 + col]
-            b4 = Z[OLD_4 + col]
-            bad = (((a1 + a2) + (a3 + a4)) + ((b1 + b2) + (b3 + b4))) * 0.0
-            least = Z[LEAST_RATIO + col]
-            area = Z[LEAST_AREA + col]
-            area = a1 if a1 < area else area
-            area = a2 if a2 < area else area
-            area = a3 if a3 < area else area
-            area = a4 if a4 < area else area
-            # The least of four ratios with one division (old areas are positive).
-            first_less, second_less = a1 * b2 < a2 * b1, a3 * b4 < a4 * b3
-            a1 = a1 if first_less else a2
-            b1 = b1 if first_less else b2
-            a3 = a3 if second_less else a4
-            b3 = b3 if second_less else b4
-            less = a1 * b3 < a3 * b1
-            ratio = (a1 if less else a3) / (b1 if less else b3)
-            Z[LEAST_RATIO + col] = ratio if ratio < least else least
-            Z[LEAST_AREA + col] = area
-            Z[NOT_A_NUMBER + col] += bad
+            keep_least_corner(col, Z)
     # over all columns
-    ratio = NO_LIMIT
-    area = NO_LIMIT
-    bad = 0.0
+    least_ratio = NO_LIMIT
+    least_area = NO_LIMIT
+    not_a_number = 0.0
     for col in range(cells):
-        ratio = min(ratio, Z[LEAST_RATIO + col])
-        area = min(area, Z[LEAST_AREA + col])
-        bad += Z[NOT_A_NUMBER + col]
-    return (ratio, area) if bad == 0.0 else (0.0, 0.0)
+        least_ratio = min(least_ratio, Z[LEAST_RATIO + col])
+        least_area = min(least_area, Z[LEAST_AREA + col])
+        not_a_number += Z[NOT_A_NUMBER + col]
+    return (least_ratio, least_area) if not_a_number == 0.0 else (0.0, 0.0)
+
+
+@inlined
+def is_too_small(trial, old, least_ratio, i, j, corner):
+    """Whether a corner triangle of cell (i, j) has lost too much of its area, or all of it."""
+    new_area = compute_doubled_area(trial, i, j, corner)
+    old_area = compute_doubled_area(old, i, j, corner)
+    return not (new_area > least_ratio * old_area and new_area > 0.0)
+
+
+@inlined
+def mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows):
+    """Mark the nodes of every corner triangle that fails in a round; True if there is any.
+
+    `failed_in` (ni+1, nj+1) is the last round, from 1, in which a node was marked, `marked_rows`
+    (ni+1) the last one in which any node of a row was.  What the round before has not touched
+    passes still.
+    """
+    ni, nj = trial.shape[1] - 1, trial.shape[2] - 1
+    failed = False
+    for i in range(ni):
+        if round > 0 and marked_rows[i] < round and marked_rows[i + 1] < round:
+            continue
+        for j in range(nj):
+            touched_in = max(
+                max(failed_in[i, j], failed_in[i, j + 1]),
+                max(failed_in[i + 1, j], failed_in[i + 1, j + 1]),
+            )
+            if touched_in < round:
+                continue
+            for corner in range(4):
+                p, q, next_p, next_q = find_triangle(i, j, corner)
+                if (p == 0 or p == ni) and (q == 0 or q == nj):
+                    continue
+                if is_too_small(trial, old, least_ratio, i, j, corner):
+                    failed = True
+                    mark = round + 1.0
+                    failed_in[p, q] = mark
+                    failed_in[next_p, q] = mark
+                    failed_in[p, next_q] = mark
+                    marked_rows[i] = round + 1
+                    marked_rows[i + 1] = round + 1
+    return failed
 
 
 @kernel
@@ -146,47 +210,26 @@ def shorten_steps(base, trial, old, least_ratio, tau):
     pass.  `tau` (2, ni+1, nj+1) is scratch.  Returns the number of rounds.
     """
     ni, nj = base.shape[1] - 1, base.shape[2] - 1
+    fraction = tau[FRACTION]
+    failed_in = tau[FAILS]
     for i in range(ni + 1):
         for j in range(nj + 1):
-            tau[FRACTION, i, j] = 1.0
-            tau[FAILS, i, j] = 0.0
+            fraction[i, j] = 1.0
+            failed_in[i, j] = 0.0
     change = trial - base
     smallest = 0.5**MOST_NODE_HALVINGS
-    marked = np.zeros(ni + 1, dtype=np.int64)  # the last round, from 1, that marked nodes of a row
+    marked_rows = np.zeros(ni + 1, dtype=np.int64)
     for round in range(100 * MOST_NODE_HALVINGS):
-        failed = False
-        for i in range(ni):
-            if round > 0 and marked[i] < round and marked[i + 1] < round:
-                continue
-            for j in range(nj):
-                # what the round before has not touched passes still
-                touched = max(
-                    max(tau[FAILS, i, j], tau[FAILS, i, j + 1]),
-                    max(tau[FAILS, i + 1, j], tau[FAILS, i + 1, j + 1]),
-                )
-                if touched < round:
-                    continue
-                for corner in range(4):
-                    p, q, far_i, far_j = find_triangle(i, j, corner)
-                    if (p == 0 or p == ni) and (q == 0 or q == nj):
-                        continue
-                    new = compute_doubled_area(trial, i, j, corner)
-                    was = compute_doubled_area(old, i, j, corner)
-                    if not (new > least_ratio * was and new > 0.0):
-                        failed = True
-                        mark = round + 1.0
-                        tau[FAILS, p, q] = tau[FAILS, far_i, q] = tau[FAILS, p, far_j] = mark
-                        marked[i] = marked[i + 1] = round + 1
-        if not failed:
+        if not mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows):
             return round
+        # halve the steps of the marked inner nodes
         for i in range(1, ni):
-            if marked[i] <= round:
+            if marked_rows[i] <= round:
                 continue
             for j in range(1, nj):
-                if tau[FAILS, i, j] > round:
-                    tau[FRACTION, i, j] = (
-                        0.5 * tau[FRACTION, i, j] if tau[FRACTION, i, j] > smallest else 0.0
-                    )
+                if failed_in[i, j] > round:
+                    halved = 0.5 * fraction[i, j] if fraction[i, j] > smallest else 0.0
+                    fraction[i, j] = halved
                     for k in range(2):
-                        trial[k, i, j] = base[k, i, j] + tau[FRACTION, i, j] * change[k, i, j]
+                        trial[k, i, j] = base[k, i, j] + halved * change[k, i, j]
     return -1

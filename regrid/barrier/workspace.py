@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -30,19 +30,14 @@ from shockgrid.regrid.barrier.residual_estimate import (
     ASPECT,
     COSECANT,
     LEAST_SCALED,
-    LOOK_ROWS,
     MOST_SHRUNK,
+    RESIDUAL_ROWS,
     STRAYED,
-    look_serial,
-    look_threaded,
+    check_residual_serial,
+    check_residual_threaded,
 )
-from shockgrid.regrid.barrier.side_laws import BarrierLaw, prepare, weigh_curves
-from shockgrid.regrid.barrier.step_control import (
-    CHUNK_SPAN,
-    MOST_CHUNK_NODES,
-    UPRIGHT,
-    measure_corners,
-)
+from shockgrid.regrid.barrier.side_inputs import BarrierInputs, prepare, weigh_curves
+from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
 from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
 from shockgrid.regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
 from shockgrid.regrid.jit import can_use_threads
@@ -54,7 +49,31 @@ from shockgrid.regrid.symmetry import Symmetry, find_symmetry
 from shockgrid.regrid.work_arrays import Carver, count_numbers, share_memory
 
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
-LEAST_SPACING_BEND = 1e-12  # departures of laws below it are round-off
+LEAST_SPACING_DEPARTURE = 1e-12  # departures of spacings below it are round-off
+LEAST_CHUNK_COLUMNS = 8  # a thread is not worth starting for fewer
+VECTOR_LENGTH = 8  # numbers in a cache line, and in the longest vectors of a processor
+MOST_SOLVE_ITERATIONS = 16
+
+
+class GivenGrids(NamedTuple):
+    """Grids of a regrid in a frame other than the workspace's: the old one, and what is filled."""
+
+    old: np.ndarray
+    result: np.ndarray
+    frame: tuple[bool, bool]
+
+
+class ResidualCheck(NamedTuple):
+    """What the residual check finds of the displaced grid.
+
+    `ratio`: the least ratio of its corner areas to the old ones, 0 unless all areas are positive
+    numbers; `residual`: an estimate of its residual in cells; `strayed`: how far inner nodes are
+    from interpolated positions at most, in old cell heights.  The latter two may be infinite.
+    """
+
+    ratio: float
+    residual: float
+    strayed: float
 
 
 def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
@@ -67,41 +86,46 @@ def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> Non
         copy_sides(view, out)
 
 
-def find_bend(first: np.ndarray) -> np.ndarray:
-    """How far the lines j = const of a grid depart from the law that the outer two give; R4.9.
+def find_spacing_departure(first_grid: np.ndarray) -> np.ndarray:
+    """How far the lines j = const of a grid depart from the spacing that the outer two give; R4.9.
 
-    first: (2, ni+1, nj+1) [m]; (ni+1, nj+1), parts of the line's length.
+    first_grid: (2, ni+1, nj+1) [m]; (ni+1, nj+1), parts of the line's length.
     """
-    laws = np.zeros(first.shape[1:])
-    for i in range(laws.shape[0] - 1):
-        np.add(laws[i], np.hypot(*(first[:, i + 1] - first[:, i])), out=laws[i + 1])
-    laws /= laws[-1].copy()
-    part = np.arange(laws.shape[1]) / (laws.shape[1] - 1)
-    for law in laws:
-        law -= law[0] * (1.0 - part) + law[-1] * part
-    laws[:, [0, -1]] = 0.0
-    laws[[0, -1]] = 0.0
-    return laws
+    # positions of the nodes on their lines, from 0 to 1
+    positions = np.zeros(first_grid.shape[1:])
+    for i in range(positions.shape[0] - 1):
+        edges = np.hypot(*(first_grid[:, i + 1] - first_grid[:, i]))
+        np.add(positions[i], edges, out=positions[i + 1])
+    positions /= positions[-1].copy()
+    # less those interpolated between the outer lines
+    departure = positions
+    column = np.arange(departure.shape[1]) / (departure.shape[1] - 1)
+    for row in departure:
+        row -= row[0] * (1.0 - column) + row[-1] * column
+    departure[:, [0, -1]] = 0.0
+    departure[[0, -1]] = 0.0
+    return departure
 
 
-def is_bent(bend: np.ndarray) -> bool:
-    """Are departures (ni+1, nj+1) of `find_bend` more than round-off anywhere?"""
-    return bool(max(bend.max(), -bend.min()) > LEAST_SPACING_BEND)
+def has_departures(spacing_departure: np.ndarray) -> bool:
+    """Whether departures (ni+1, nj+1) of `find_spacing_departure` exceed round-off anywhere."""
+    most = max(spacing_departure.max(), -spacing_departure.min())
+    return bool(most > LEAST_SPACING_DEPARTURE)
 
 
 class Workspace:
-    """Grids, laws, matrix and vectors of a block of ni × nj cells in the workspace's frame.
+    """Grids, spacings, matrix and vectors of a block of ni × nj cells in the workspace's frame.
 
     With `shared`, its large arrays lie in the memory that all regrids of a thread share: `take`
-    lays them out there.
+    places them there.
     """
 
-    law: Any  # a `BarrierLaw`
-    own_old: np.ndarray
-    own_sides: np.ndarray
-    own_base: np.ndarray
-    own_trial: np.ndarray
-    own_sound: np.ndarray
+    inputs: Any  # `BarrierInputs`
+    old_array: np.ndarray
+    sides_array: np.ndarray
+    base_array: np.ndarray
+    trial_array: np.ndarray
+    sound_array: np.ndarray
     curve: np.ndarray
     gradient: np.ndarray
     solution: np.ndarray
@@ -124,64 +148,79 @@ class Workspace:
         self.nj = nj
         self.threads = threads
         self.tuning = tuning
-        self.shape = shape = (2, ni + 1, nj + 1)
+        self.shape = (2, ni + 1, nj + 1)
+        # what is taken from the sides
         self.along_i, self.along_j = np.zeros((5, ni)), np.zeros((5, nj))
         self.blend_i, self.blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
-        self.bent = False
-        self.bend = np.zeros((ni + 1, nj + 1))
-        self.way = np.zeros((2, nj + 1))
-        self.most_bend = np.zeros(nj + 1)
-        self.boundary_check = BoundaryCheck(ni, nj)
-        inner = nj - 1
-        chunks = max(1, min(threads, inner // 8), -(-inner // MOST_CHUNK_NODES))
-        self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
-        self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * nj // chunks
-        # Vectors of the solve have columns of zeros behind the last one, so that its loops run over
-        # whole vectors of the processor: a rest of a few columns would take as long as the others.
-        self.whole_columns = self.columns.copy()
-        self.whole_columns[-1] += -(nj - self.columns[-2]) % 8
-        vector = (2, ni + 1, -(-(int(self.whole_columns[-1]) + 1) // 8) * 8)
-        self.totals = np.zeros(vector[2])
-        self.found = np.zeros((chunks, 5))
+        self.departs = False
+        self.spacing_departure = np.zeros((ni + 1, nj + 1))
+        self.chords = np.zeros((2, nj + 1))
+        self.most_departure = np.zeros(nj + 1)
         self.motion_tables = (
             np.zeros((6, ni + 1)), np.zeros((6, nj + 1)), np.zeros((2, 5)), np.zeros((2, nj + 1)),
             np.zeros(nj + 1),
         )  # fmt: skip
+        self.boundary_check = BoundaryCheck(ni, nj)
         self.least_limiting_rate = 0.0
         self.symmetry: Symmetry | None = None
         self.spacing: GivenSpacing | None = None
         self.no_shares = np.zeros((2, 1, 1))
         self.coarse = CoarseCorrection(ni, nj, tuning)
-        # what is of the block's size, by name: shape, and the column at which a cache line begins
-        self.arrays = {
-            **dict.fromkeys(("own_old", "own_sides", "own_base", "own_trial"), (shape, 0)),
-            "own_sound": ((ni, nj), 0),
-            "coarse_memory": ((self.coarse.size,), 0),
-            "gradient": (shape, 0),
-            **dict.fromkeys(VECTORS, (vector, 1)),
-            "H": ((chunks, (ni + 1) * NODE_ROWS), 0),
-            "curve": (shape, 0),
-        }
-        self.size = sum(count_numbers(*form) for form, _ in self.arrays.values())
-        form = chunks, max(ENERGY_ROWS, LOOK_ROWS)
-        self.scratch = Carver(np.zeros(count_numbers(*form))).cut(*form)
+        self._cut_columns(threads)
+        self._list_arrays()
+        # its own memory, or that of the thread
         self.shared = shared
-        self.clean = not shared
-        self._whole = np.zeros(0)
+        self.is_clean = not shared
+        self._memory = np.zeros(0)
         if not shared:
-            self._lay(np.zeros(self.size))
-            self.own_sound[:] = 1.0
-            self.use_own()
+            self._place_arrays(np.zeros(self.size))
+            self.sound_array[:] = 1.0
+            self.use_arrays()
 
-    def _lay(self, whole: np.ndarray) -> None:
-        """Make the large arrays views of `whole` (`size` or more,), one behind the other.
+    def _cut_columns(self, threads: int) -> None:
+        """Divide the columns of inner nodes, and those of cells, among threads and scratches."""
+        inner = self.nj - 1
+        chunks = max(1, min(threads, inner // LEAST_CHUNK_COLUMNS), -(-inner // MOST_CHUNK_NODES))
+        self.columns = 1 + np.arange(chunks + 1, dtype=np.int64) * inner // chunks
+        self.cell_columns = np.arange(chunks + 1, dtype=np.int64) * self.nj // chunks
+        # Vectors of the solve have columns of zeros behind the last one, so that its loops run over
+        # whole vectors of the processor: a few columns more would take as long as the others.
+        self.whole_columns = self.columns.copy()
+        self.whole_columns[-1] += -(self.nj - self.columns[-2]) % VECTOR_LENGTH
+        self.extremes = np.zeros((chunks, 5))
+        shape = chunks, max(ENERGY_ROWS, RESIDUAL_ROWS)
+        self.scratch = Carver(np.zeros(count_numbers(*shape))).cut(*shape)
+
+    def _list_arrays(self) -> None:
+        """Name the arrays of the block's size, with shape and the column that begins a cache line.
+
+        `size` is how many numbers they need together.
+        """
+        chunks = self.columns.size - 1
+        columns = int(self.whole_columns[-1]) + 1
+        vector_shape = (2, self.ni + 1, -(-columns // VECTOR_LENGTH) * VECTOR_LENGTH)
+        self.totals = np.zeros(vector_shape[2])
+        grids = ("old_array", "sides_array", "base_array", "trial_array")
+        self.arrays = {
+            **dict.fromkeys(grids, (self.shape, 0)),
+            "sound_array": ((self.ni, self.nj), 0),
+            "coarse_memory": ((self.coarse.size,), 0),
+            "gradient": (self.shape, 0),
+            **dict.fromkeys(VECTORS, (vector_shape, 1)),
+            "H": ((chunks, (self.ni + 1) * NODE_ROWS), 0),
+            "curve": (self.shape, 0),
+        }
+        self.size = sum(count_numbers(*shape) for shape, _ in self.arrays.values())
+
+    def _place_arrays(self, memory: np.ndarray) -> None:
+        """Make the large arrays views of `memory` (`size` or more,), one behind the other.
 
         In memory that other regrids of the thread may use too, nothing of them is kept.
         """
-        if whole is self._whole:
+        if memory is self._memory:
             return
-        self._whole = whole
-        carver = Carver(whole)
+        self._memory = memory
+        carver = Carver(memory)
         for name, (shape, column) in self.arrays.items():
             setattr(self, name, carver.cut(*shape, column=column))
         self.coarse.take_arrays(self.coarse_memory)
@@ -189,47 +228,46 @@ class Workspace:
         self.shortening = self.p.reshape(-1)[: math.prod(self.shape)].reshape(self.shape)
 
     def _clear(self) -> None:
-        """Zeros where the solve looks for them: another regrid may have used the memory."""
+        """Set zeros where the solve expects them: another regrid may have used the memory."""
         for vector in (self.r, self.z, self.p_old):
             vector[:] = 0.0
         for side in get_sides(self.gradient):
             side[:] = 0.0
         rows = self.H.reshape(self.columns.size - 1, self.ni + 1, -1, CHUNK_SPAN)
         rows[:, 0] = 0.0
-        last = self.columns[-1]
-        whole = self.whole_columns[-1]
-        rows[-1, :, :, last - self.columns[-2] + 1 : whole - self.columns[-2] + 1] = 0.0
-        self.clean = True
+        chunk_start = self.columns[-2] - 1
+        rows[-1, :, :, self.columns[-1] - chunk_start : self.whole_columns[-1] - chunk_start] = 0.0
+        self.is_clean = True
 
     @functools.cached_property
-    def full_barrier(self) -> np.ndarray:
-        """Parts (ni, nj) of a barrier that has the same weight everywhere."""
+    def even_barrier(self) -> np.ndarray:
+        """Strengths (ni, nj) of a barrier that has the same weight everywhere."""
         return np.ones((self.ni, self.nj))
 
-    def use_own(self) -> None:
+    def use_arrays(self) -> None:
         """Let all grids be arrays of the workspace, whose contents may be anything."""
-        self.old = self.own_old
-        self.sides = self.own_sides
-        self.sound = self.own_sound
-        self.base = self.own_base
-        self.trial = self.own_trial
+        self.old = self.old_array
+        self.sides = self.sides_array
+        self.sound = self.sound_array
+        self.base = self.base_array
+        self.trial = self.trial_array
         self.frame = UPRIGHT
-        self.given = None
+        self.given: GivenGrids | None = None
 
     def take(
-        self, previous, boundary, transposed, mirrored, sound=None, into=None, first=None
+        self, previous, boundary, transposed, mirrored, sound=None, into=None, first_grid=None
     ) -> None:
         """Take up the grid before, (2, ni+1, nj+1) in its own frame, and the new sides.
 
         `sound` (ni, nj) [m/s], where speeds of sound are given; without a grid before sides alone.
         In the workspace's own frame they are read where they are, and `base` is the array `into`,
-        a new one without it; else a look reads the grid before where it is (`load_old`).  `first`:
-        the grid whose spacing is kept.
+        a new one without it; else the residual check reads the grid before where it is
+        (`load_old`).  `first_grid`: the grid whose spacing is kept.
         """
         if self.shared:
-            self._lay(share_memory(self.size))
-            self.clean = False
-        self.use_own()
+            self._place_arrays(share_memory(self.size))
+            self.is_clean = False
+        self.use_arrays()
         self.into = np.empty(boundary.shape) if into is None else into
         if not (transposed or mirrored):
             self.base = self.into
@@ -240,27 +278,27 @@ class Workspace:
             load_grid(boundary, self.sides, *self.frame, inside=False)
             if previous is not None:
                 load_grid(previous, self.old, *self.frame, inside=False)
-                self.given = previous
+                self.given = GivenGrids(previous, self.into, self.frame)
         if sound is not None:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
         self.spacing = None
-        if first is not None:
-            own = np.empty(self.shape)
-            load_grid(first, own, transposed, mirrored, inside=True)
-            self.spacing = find_given_spacing(own)
+        if first_grid is not None:
+            framed = np.empty(self.shape)
+            load_grid(first_grid, framed, transposed, mirrored, inside=True)
+            self.spacing = find_given_spacing(framed)
 
     def load_old(self) -> None:
         """Copy the grid before to `old`, and the displaced one to `base`, if a residual check has
         them in another frame."""
         if self.given is not None:
-            load_grid(self.given, self.old, *self.frame, inside=True)
+            load_grid(self.given.old, self.old, *self.frame, inside=True)
             load_grid(self.into, self.base, *self.frame, inside=True)
             self.given = None
 
-    def keep_own(self, old: np.ndarray, sides: np.ndarray) -> None:
-        """Copies of `old` and `sides` that may be written to, in their places."""
-        self.old = self.own_old
-        self.sides = self.own_sides
+    def copy_to_arrays(self, old: np.ndarray, sides: np.ndarray) -> None:
+        """Let `old` and `sides` be copies of these grids that may be written to."""
+        self.old = self.old_array
+        self.sides = self.sides_array
         self.old[:] = old
         self.sides[:] = sides
 
@@ -284,7 +322,7 @@ class Workspace:
         cost: bool = False,
         curved: bool = False,
     ) -> None:
-        """Take the laws from `sides`, and the weights of the functional's terms.
+        """Take the spacings from `sides`, and the weights of the functional's terms.
 
         `cost` needs the cells' sound speeds in `sound`; `least_limiting_rate` [1/s] is the least R
         of theory R4.11; `tuning` where it is not the workspace's own.  With `curved`, where both
@@ -293,135 +331,148 @@ class Workspace:
         """
         tuning = tuning or self.tuning
         epsilon = float(tuning.epsilon)
+        # lines that take the shapes of the sides
         share_i = 0.0
         share_j = 0.0
         if curved:
-            share_i, share_j, least = weigh_curves(
+            share_i, share_j, least_epsilon = weigh_curves(
                 self.sides, tuning.open_side, tuning.closed_side, tuning.curved_barrier,
                 tuning.half_barrier,
             )  # fmt: skip
             if share_i + share_j > 0.0:
                 fill_curves(self.sides, share_i, share_j, self.curve)
-                epsilon = max(epsilon, least)
-        law = BarrierLaw(
+                epsilon = max(epsilon, least_epsilon)
+        inputs = BarrierInputs(
             *tuning.get_weights(epsilon, 1.0, cost), self.along_i, self.along_j, self.blend_i,
-            self.blend_j, self.bent, self.bend, self.most_bend, self.way, *self._take_shares(),
-            self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0, 0.0, self.sound, 0.0,
+            self.blend_j, self.departs, self.spacing_departure, self.most_departure, self.chords,
+            *self._take_shares(), self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0,
+            0.0, self.sound, 0.0,
         )  # fmt: skip
+        # all that follows from the sides alone
         self.symmetry = None
         self.motion = SideMotion(self.sides, *self.motion_tables)
         self.block = prepare.entry(
-            self.old, law, self.motion, conditional,
+            self.old, inputs, self.motion, conditional,
             (float(tuning.cost_margin), float(self.least_limiting_rate)),
             self.boundary_check.scratch,
         )  # fmt: skip
-        _, _, _, self.sigma, self.area_target, scale = self.block
+        self.sigma = self.block.sigma
+        self.area_target = self.block.area_target
+        cost_scale = self.block.cost_scale
+        # the spacing that is kept instead
         if self.spacing is not None:
             sides = SideLengths(self.along_i, self.along_j, self.blend_i, self.blend_j)
             self.area_target = self.sigma / self.spacing.compute_mean_area(sides)
-            if has_cell_terms(law):
+            if has_cell_terms(inputs):
                 rate = self.spacing.compute_limiting_rate(sides, self.sound, self.area_target)
                 rate = max(tuning.cost_margin * rate, self.least_limiting_rate)
-                scale = 2.0 / (rate * rate)
-        self.law = law._replace(sigma=self.sigma, area_target=self.area_target, cost_scale=scale)
+                cost_scale = 2.0 / (rate * rate)
+        self.inputs = inputs._replace(
+            sigma=self.sigma, area_target=self.area_target, cost_scale=cost_scale
+        )
         self.iterations = 0
 
     def _take_shares(self) -> tuple[bool, np.ndarray, np.ndarray, np.ndarray]:
-        """The fields of a `BarrierLaw` for a spacing that is given."""
+        """The fields of `BarrierInputs` for a spacing that is kept."""
         if self.spacing is None:
             return False, self.no_shares, self.no_shares, self.no_shares[0]
         return True, *self.spacing
 
     @property
     def is_simple(self) -> bool:
-        """Do the sides run round an area, and neither cross nor touch?  But for cuts that are seen
+        """Whether the sides enclose an area without crossing or touching, apart from detected cuts
         (`find_cut_edges`)."""
         return self.block.area > 0.0 and self.boundary_check.is_clear(
             self.block.meeting, self.sides
         )
 
-    def take_laws(self, bend: np.ndarray) -> None:
-        """Keep the spacing law that each line j = const has: `bend` (ni+1, nj+1) of `find_bend`."""
-        self.most_bend[:] = np.maximum(bend.max(axis=0), -bend.min(axis=0))
-        self.bent = is_bent(bend)
-        if self.bent:
-            self.bend = bend
+    def keep_departure(self, spacing_departure: np.ndarray) -> None:
+        """Keep the spacing that each line j = const has, by its departure (ni+1, nj+1) from the
+        sides' (`find_spacing_departure`)."""
+        self.most_departure[:] = np.maximum(
+            spacing_departure.max(axis=0), -spacing_departure.min(axis=0)
+        )
+        self.departs = has_departures(spacing_departure)
+        if self.departs:
+            self.spacing_departure = spacing_departure
 
-    def look(self) -> tuple[float, float, float]:
-        """Move `old` along with its sides (R6.5) into `base`.  Least ratio of its corner areas to
-        the old ones, an estimate of its residual in cells, and how far inner nodes are from
-        interpolated places at most, in old cell heights.
+    def check_displaced_grid(self) -> ResidualCheck:
+        """Move `old` along with its sides (R6.5) into `base`, and estimate its residual.
 
-        The ratio is 0 unless all areas are positive numbers; the estimate is infinite then, and
-        where a spacing is given.
+        The residual is infinite where areas are not positive, and where a spacing is kept.
         """
-        look = look_serial
+        check = check_residual_serial
         if self._set_threads():
-            look = look_threaded
-        given = (self.old, self.base, UPRIGHT)
+            check = check_residual_threaded
+        grids = (self.old, self.base, UPRIGHT)
         if self.given is not None:
-            given = (self.given, self.into, self.frame)
-        total, self.marks = look.entry(
-            self.base, given, self.law, self.motion, (self.coarse.starts_i, self.coarse.sums),
-            self.totals, (self.columns, self.found, self.scratch),
+            grids = tuple(self.given)
+        total, self.marks = check.entry(
+            self.base, grids, self.inputs, self.motion, (self.coarse.starts_i, self.coarse.sums),
+            self.totals, (self.columns, self.extremes, self.scratch),
         )  # fmt: skip
-        found = self.found[0]
-        good = found[LEAST_SCALED] > 0.0
-        shrunk = found[MOST_SHRUNK]
-        if not (good and shrunk > 0.0 and total >= 0.0):
+        extremes = self.extremes[0]
+        is_convex = extremes[LEAST_SCALED] > 0.0
+        shrunk = extremes[MOST_SHRUNK]
+        if not (is_convex and shrunk > 0.0 and total >= 0.0):
             self.load_old()
-            ratio = self.compare_corners(self.base, self.old) if good else 0.0
-            return ratio, math.inf, math.inf
+            ratio = self.compare_corners(self.base, self.old) if is_convex else 0.0
+            return ResidualCheck(ratio, math.inf, math.inf)
         if self.spacing is not None:  # the estimate knows of the sides' lengths alone
-            return float(1.0 / shrunk), math.inf, math.inf
+            return ResidualCheck(float(1.0 / shrunk), math.inf, math.inf)
         inner = (self.ni - 1) * (self.nj - 1)
         residual = math.sqrt(total / (self.sigma * inner))
-        return float(1.0 / shrunk), residual, float(found[STRAYED])
+        return ResidualCheck(float(1.0 / shrunk), residual, float(extremes[STRAYED]))
 
     def get_quality(self) -> tuple[float, float, int, int] | None:
-        """What `measure_worst` says of the grid looked at last, if all its corners are positive."""
-        cosecant = self.found[0, COSECANT]
-        aspect = self.found[0, ASPECT]
+        """What `measure_worst` says of the grid checked last, if all its corners are positive."""
+        cosecant = self.extremes[0, COSECANT]
+        aspect = self.extremes[0, ASPECT]
         if self.marks or not cosecant < math.inf:
             return None
         return math.sqrt(1.0 / cosecant), math.sqrt(aspect), 0, 0
 
     def assemble(self, nodes) -> None:
         """Gradient and Hessian of the functional on a convex grid."""
-        if not self.clean:
+        if not self.is_clean:
             self._clear()
         if self._set_threads():
-            assemble_on_threads(nodes, self.law, self.columns, self.H, self.gradient, self.scratch)
+            assemble_on_threads(
+                nodes, self.inputs, self.columns, self.H, self.gradient, self.scratch
+            )
         else:
-            self._assemble(assemble_barrier.entry, nodes, 0.0)
+            self._assemble_chunks(assemble_barrier.entry, nodes, 0.0)
 
     def assemble_smoothed(self, nodes, spread: float) -> None:
         """The same for the smoothed denominator on any grid."""
-        if not self.clean:
+        if not self.is_clean:
             self._clear()
-        self._assemble(assemble_smoothed, nodes, spread)
+        self._assemble_chunks(assemble_smoothed, nodes, spread)
 
-    def _assemble(self, assemble, nodes, spread) -> None:
+    def _assemble_chunks(self, assemble, nodes, spread) -> None:
         for c in range(self.columns.size - 1):
             first = self.columns[c]
             last = self.columns[c + 1]
             assemble(
-                nodes, self.law, spread, first, last, self.H[c], self.gradient, self.scratch[c]
+                nodes, self.inputs, spread, first, last, self.H[c], self.gradient, self.scratch[c]
             )
 
     def _set_threads(self) -> bool:
-        """Are the chunks to be computed on threads?  As many are set then."""
+        """Whether the chunks are to be computed on threads; as many are set then."""
         if self.threads == 1 or not can_use_threads():
             return False
         numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
         return True
 
-    def solve(self, tolerance: float, floor: float, most: int = 16, guess=None):
+    def solve(
+        self, tolerance: float, floor: float, most: int = MOST_SOLVE_ITERATIONS, guess=None
+    ) -> tuple[int, float, float]:
         """Fill `change` with the solution of `H change = -gradient`, that of the last assembly.
 
         Returns iterations, first and last residual.  Without `guess` the boundary stays; with it,
         its boundary values are kept and its inside is where the iteration begins.
         """
+        # right-hand side
         right = self.r[:, :, : self.nj + 1]
         self.solution[:] = 0.0
         if guess is None:
@@ -439,23 +490,23 @@ class Workspace:
         solve = solve_serial
         if self._set_threads():
             solve = solve_threaded
-        done, first, last, _ = solve.entry(
+        iterations, first, last, _ = solve.entry(
             self.whole_columns, self.H, (self.solution, self.r, self.z),
             (self.p, self.p_old, self.product), self.totals,
             (float(tolerance), float(floor), int(most)), self.scratch,
         )  # fmt: skip
-        self.iterations += done
+        self.iterations += iterations
         if self.symmetry is not None:
             self._even_out_change(guess)
-        return done, first, last
+        return iterations, first, last
 
     def find_symmetry(self) -> None:
-        """See how `old` and its displaced grid in `base` are symmetric: solutions will be, too."""
+        """Find how `old` and its displaced grid in `base` are symmetric: solutions will be, too."""
         if self.spacing is not None:
             return  # it need not be symmetric
-        cells = [self.sound] if has_cell_terms(self.law) else []
-        bend = self.bend if self.bent else None
-        self.symmetry = find_symmetry(self.old, self.base, cells, bend)
+        cell_values = [self.sound] if has_cell_terms(self.inputs) else []
+        departure = self.spacing_departure if self.departs else None
+        self.symmetry = find_symmetry(self.old, self.base, cell_values, departure)
 
     def _even_out_change(self, guess) -> None:
         """Leave the symmetric part of what a solve has added to `guess` in `change`."""
@@ -481,16 +532,17 @@ class Workspace:
         sines = compute_scaled_jacobians(nodes)
         for corner, i, j in BLOCK_CORNERS:
             sines[corner, i, j] = 1.0
+        inputs = self.inputs
         with np.errstate(divide="ignore"):
-            return np.clip(self.law.least_sine / sines.min(axis=0), 1.0, self.law.strengthening)
+            return np.clip(inputs.least_sine / sines.min(axis=0), 1.0, inputs.strengthening)
 
-    def compute_energy(self, nodes, spread: float, barrier=None):
+    def compute_energy(self, nodes, spread: float, barrier=None) -> tuple[float, float]:
         """Smoothed energy, and least scaled corner area; `barrier` as `compute_barrier` gives it.
 
         Without it the barrier has the same weight everywhere.  At `spread` 0 the energy is
         J itself, and not finite where a cell is not convex.
         """
-        barrier = self.full_barrier if barrier is None else barrier
+        barrier = self.even_barrier if barrier is None else barrier
         energy = 0.0
         least = np.inf
         for c in range(self.cell_columns.size - 1):
@@ -498,7 +550,7 @@ class Workspace:
             last = self.cell_columns[c + 1]
             rows = self.scratch[c]
             count = last - first
-            fill_energy(nodes, self.law, spread, barrier, first, last, rows)
+            fill_energy(nodes, self.inputs, spread, barrier, first, last, rows)
             energy += float(rows[ENERGY_ROW : ENERGY_ROW + count].sum())
             least = min(least, float(rows[LEAST_AREA_ROW : LEAST_AREA_ROW + count].min()))
         return energy, least

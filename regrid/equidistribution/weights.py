@@ -37,7 +37,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shockgrid.regrid.barrier.side_laws import LENGTH, LENGTH_CHANGE, fill_laws
+from shockgrid.regrid.barrier.side_inputs import LENGTH, LENGTH_CHANGE, fill_spacings
 from shockgrid.regrid.curves import arc_spacing, solve_ed1
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.measure.corners import compute_centres
@@ -371,7 +371,7 @@ def compute_side_density(boundary: np.ndarray) -> np.ndarray:
     ni, nj = boundary.shape[1] - 1, boundary.shape[2] - 1
     along_i, along_j = np.zeros((5, ni)), np.zeros((5, nj))
     blend_i, blend_j = np.zeros(ni + 1), np.zeros(nj + 1)
-    fill_laws(boundary, True, along_i, along_j, blend_i, blend_j)
+    fill_spacings(boundary, True, along_i, along_j, blend_i, blend_j)
     u, v = 0.5 * (blend_i[1:] + blend_i[:-1]), 0.5 * (blend_j[1:] + blend_j[:-1])
     length = along_i[LENGTH][:, None] + along_i[LENGTH_CHANGE][:, None] * v
     width = along_j[LENGTH] + u[:, None] * along_j[LENGTH_CHANGE]

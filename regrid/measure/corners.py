@@ -169,9 +169,9 @@ def count_triangles(nodes: np.ndarray) -> int:
 
 @inlined
 def find_triangle(i, j, corner):
-    """Nodes of a corner triangle, as (p, q, far_i, far_j).
+    """Nodes of a corner triangle, as (p, q, next_p, next_q).
 
-    The corner's own node is (p, q), its neighbours in the cell are (far_i, q) and (p, far_j).
+    The corner's own node is (p, q), its neighbours in the cell are (next_p, q) and (p, next_q).
     """
     p = i + corner // 2
     q = j + (1 if corner == 1 or corner == 2 else 0)

@@ -68,34 +68,34 @@ def square(edge):
 
 
 @inlined
-def find_areas(low, high, near, far):
+def find_areas(low, up, near, far):
     """Doubled areas of a cell's corner triangles, from its `take_edges`."""
     return (
-        low[0] * near[1] - low[1] * near[0], high[0] * near[1] - high[1] * near[0],
-        high[0] * far[1] - high[1] * far[0], low[0] * far[1] - low[1] * far[0],
+        low[0] * near[1] - low[1] * near[0], up[0] * near[1] - up[1] * near[0],
+        up[0] * far[1] - up[1] * far[0], low[0] * far[1] - low[1] * far[0],
     )  # fmt: skip
 
 
 @inlined
-def measure_cell(low, high, near, far):
+def measure_cell(low, up, near, far):
     """Least sine of a cell's corners, squared with its sign, so that one root serves a whole grid;
     squares and product of the doubled mid-lines along i and along j."""
-    area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
-    low_2 = square(low)
-    high_2 = square(high)
-    near_2 = square(near)
-    far_2 = square(far)
-    sine_1 = area_1 * abs(area_1) / (low_2 * near_2)
-    sine_2 = area_2 * abs(area_2) / (high_2 * near_2)
-    sine_3 = area_3 * abs(area_3) / (high_2 * far_2)
-    sine_4 = area_4 * abs(area_4) / (low_2 * far_2)
-    low_sine = sine_1 if sine_1 < sine_2 else sine_2
-    high_sine = sine_3 if sine_3 < sine_4 else sine_4
-    mid = (low[0] + high[0], low[1] + high[1])
-    across = (near[0] + far[0], near[1] + far[1])
-    dot = mid[0] * across[0] + mid[1] * across[1]
-    sine = low_sine if low_sine < high_sine else high_sine
-    return sine, square(mid), square(across), dot
+    area_1, area_2, area_3, area_4 = find_areas(low, up, near, far)
+    low_square = square(low)
+    up_square = square(up)
+    near_square = square(near)
+    far_square = square(far)
+    sine_1 = area_1 * abs(area_1) / (low_square * near_square)
+    sine_2 = area_2 * abs(area_2) / (up_square * near_square)
+    sine_3 = area_3 * abs(area_3) / (up_square * far_square)
+    sine_4 = area_4 * abs(area_4) / (low_square * far_square)
+    sine_12 = sine_1 if sine_1 < sine_2 else sine_2
+    sine_34 = sine_3 if sine_3 < sine_4 else sine_4
+    mid_i = (low[0] + up[0], low[1] + up[1])
+    mid_j = (near[0] + far[0], near[1] + far[1])
+    dot = mid_i[0] * mid_j[0] + mid_i[1] * mid_j[1]
+    sine = sine_12 if sine_12 < sine_34 else sine_34
+    return sine, square(mid_i), square(mid_j), dot
 
 
 @kernel
@@ -125,16 +125,16 @@ def fill_scaled_jacobians(nodes, out):
         x1 = x[i + 1]
         y1 = y[i + 1]
         for j in range(out.shape[2]):
-            low, high, near, far = take_edges(x0, y0, x1, y1, j)
-            area_1, area_2, area_3, area_4 = find_areas(low, high, near, far)
-            low_2 = square(low)
-            high_2 = square(high)
-            near_2 = square(near)
-            far_2 = square(far)
-            out[0, i, j] = area_1 / np.sqrt(low_2 * near_2)
-            out[1, i, j] = area_2 / np.sqrt(high_2 * near_2)
-            out[2, i, j] = area_3 / np.sqrt(high_2 * far_2)
-            out[3, i, j] = area_4 / np.sqrt(low_2 * far_2)
+            low, up, near, far = take_edges(x0, y0, x1, y1, j)
+            area_1, area_2, area_3, area_4 = find_areas(low, up, near, far)
+            low_square = square(low)
+            up_square = square(up)
+            near_square = square(near)
+            far_square = square(far)
+            out[0, i, j] = area_1 / np.sqrt(low_square * near_square)
+            out[1, i, j] = area_2 / np.sqrt(up_square * near_square)
+            out[2, i, j] = area_3 / np.sqrt(up_square * far_square)
+            out[3, i, j] = area_4 / np.sqrt(low_square * far_square)
 
 
 # Rows of the scratch of `measure_rows`, and of its result (one value a row of cells).
@@ -159,11 +159,11 @@ def measure_rows(nodes, rows, worst, bad_cells):
             edges = take_edges(x0, y0, x1, y1, j)
             area_1, area_2, area_3, area_4 = find_areas(*edges)
             sine, along, across, dot = measure_cell(*edges)
-            low_area = area_1 if area_1 < area_2 else area_2
-            high_area = area_3 if area_3 < area_4 else area_4
+            area_12 = area_1 if area_1 < area_2 else area_2
+            area_34 = area_3 if area_3 < area_4 else area_4
             # Comparisons lose a NaN in one corner; the sum does not.
-            spoiled = 0.0 * (area_1 + area_2 + area_3 + area_4)
-            rows[AREA, j] = (low_area if low_area < high_area else high_area) + spoiled
+            not_a_number = 0.0 * (area_1 + area_2 + area_3 + area_4)
+            rows[AREA, j] = (area_12 if area_12 < area_34 else area_34) + not_a_number
             rows[SINE, j] = sine
             rows[ASPECT, j] = along / across if along > across else across / along
             rows[SKEW, j] = dot * dot / (along * across)

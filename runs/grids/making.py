@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from shockgrid.regrid.algebraic import transfinite_grid
-from shockgrid.regrid.barrier.given_spacing import find_given_spacing, is_told_by_sides
+from shockgrid.regrid.barrier.given_spacing import agrees_with_sides, find_given_spacing
 from shockgrid.regrid.barrier.repair import repair_grid
 from shockgrid.regrid.barrier.turning import is_convex
 from shockgrid.regrid.domains import DOMAINS, MovingDomain, make_domain
@@ -267,7 +267,7 @@ def is_graded_inside(nodes: np.ndarray) -> bool:
     """Has a valid plane grid a spacing that its sides do not tell?"""
     if nodes.shape[0] == 3 or not is_convex(nodes):
         return False
-    return not is_told_by_sides(find_given_spacing(nodes))
+    return not agrees_with_sides(find_given_spacing(nodes))
 
 
 def find_nodes(grid: Grid | np.ndarray | str | Path) -> np.ndarray:

@@ -12,7 +12,9 @@ from shockgrid.hydro.formulas.geometry import GEOMETRIES, PLANE
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LIMITERS
 from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, scratch, slopes, update
-from shockgrid.regrid.barrier import residual_estimate as look
+from shockgrid.regrid.algebraic import RowBlend
+from shockgrid.regrid.barrier import residual_estimate as check
+from shockgrid.regrid.barrier.functional import CellNumbers, CornerNumbers
 from shockgrid.regrid.compilation.first_calls import prepare_compiler
 
 CURVED = GEOMETRIES["axisymmetric"]
@@ -69,14 +71,15 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "radial lines": (lambda: axisymmetric.fill_lines, ()),
     "radial shifts": (lambda: axisymmetric.fill_shift_after, ()),
 }
-NUMBERS = (1.0,) * 8
-LOOKS = {  # loops over a row of cells of the regridder's check: their arguments before the scratch
-    "moved row": (look.move_row, ((0.5, 0.1, *(((0.1, 0.1),) * 4), 0.1, 0.1), 16)),
-    "old measures": (look.measure_old, (16,)),
-    "laws of edges": (look.take_laws, (NUMBERS[:5], NUMBERS[:3], 16)),
-    "old areas": (look.fill_old_areas, (16,)),
-    "cells": (look.take_row_of_cells, (NUMBERS, 16)),
-    "nodes": (look.add_row, (16,)),
+CORNER = CornerNumbers(1.0, 1.0, 1.0, 1.0)
+ROW_NUMBERS = check.RowNumbers(1.0, 1.0, 1.0, 1.0, CORNER, CellNumbers(1.0, 1.0), 1.0)
+CHECKS = {  # loops over a row of cells of the regridder's check: their arguments before the scratch
+    "moved row": (check.move_row, (RowBlend(0.5, 0.1, *(((0.1, 0.1),) * 4), 0.1, 0.1), 16)),
+    "old measures": (check.measure_old, (16,)),
+    "lengths of edges": (check.load_edge_numbers, ((1.0,) * 5, (1.0,) * 3, 16)),
+    "old areas": (check.fill_old_areas, (16,)),
+    "cells": (check.add_row_of_cells, (ROW_NUMBERS, 16)),
+    "nodes": (check.add_row, (16,)),
 }
 HOISTED = {
     "switch": 2,
@@ -99,13 +102,13 @@ def count_kinds(function, *arguments):
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86-64 code")
-@pytest.mark.parametrize("name", [*PHASES, *LOOKS])
+@pytest.mark.parametrize("name", [*PHASES, *CHECKS])
 def test_rows_of_cells_are_vectors(name):
     if numba.version_info.short < PACKED_SINCE.get(name, (0, 0)):
         pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
-    if name in LOOKS:
-        kernel, arguments = LOOKS[name]
-        packed, scalar = count_kinds(kernel.py_func, *arguments, np.ones(look.LOOK_ROWS))
+    if name in CHECKS:
+        kernel, arguments = CHECKS[name]
+        packed, scalar = count_kinds(kernel.py_func, *arguments, np.ones(check.RESIDUAL_ROWS))
     else:
         make, arguments = PHASES[name]
         count = 1 if name == "HLL flux" else 16

@@ -194,7 +194,7 @@ def test_untangling_unfolds_a_shaken_grid(amplitude):
 def look_and_solve(work, nodes):
     """The estimate of the residual, and the residual itself, in cells."""
     work.old[:] = nodes
-    ratio, estimated, _ = work.look()
+    ratio, estimated, _ = work.check_displaced_grid()
     assert ratio == pytest.approx(1.0, rel=1e-13) and np.array_equal(work.base, nodes)
     work.assemble(nodes)
     _, first, _ = work.solve(0.0, 0.0, 0)
@@ -234,7 +234,7 @@ def test_limiting_cells_enter_the_estimate():
     assert max(estimated, found) < 1e-4 * begun
     # the minimum without what cells cost lies apart
     work.begin(True, 1.0, 0.0)
-    assert work.look()[1] > 1e-2 * begun
+    assert work.check_displaced_grid()[1] > 1e-2 * begun
 
 
 def priced(nodes, weight):

@@ -19,7 +19,7 @@ def make_work(ni=64, nj=48, limiting=False, seed=0):
     work.old[:] = work.sides[:] = nodes
     work.sound[:] = 1.0 + 10.0 * np.exp(-20.0 * (i - 0.5) ** 2)[:-1, :-1] if limiting else 1.0
     work.begin(True, 0.9, 0.1, Tuning(epsilon=1e-1), cost=limiting)
-    work.look()
+    work.check_displaced_grid()
     work.assemble(nodes)
     return work, nodes
 
@@ -44,7 +44,7 @@ def test_coarse_matrix_is_that_of_the_fine_cells(limiting):
     work, nodes = make_work(limiting=limiting)
     level = work.coarse.levels[-1]
     starts_i, starts_j = work.coarse.starts_i, level.starts_j
-    assert cells.fill_coarse_matrix(nodes, work.law, starts_i, starts_j, level.matrix)
+    assert cells.fill_coarse_matrix(nodes, work.inputs, starts_i, starts_j, level.matrix)
     wave_i, wave_j = (
         np.sin(np.pi * waves * np.arange(n + 1) / n) for waves, n in ((1, work.ni), (2, work.nj))
     )
@@ -62,7 +62,7 @@ def test_solve_is_that_of_the_dense_matrix():
     work, nodes = make_work()
     level = work.coarse.levels[-1]
     assert cells.fill_coarse_matrix(
-        nodes, work.law, work.coarse.starts_i, level.starts_j, level.matrix
+        nodes, work.inputs, work.coarse.starts_i, level.starts_j, level.matrix
     )
     shape = (level.matrix.shape[0], level.matrix.shape[2])
     inner = np.zeros((2, *shape), dtype=bool)

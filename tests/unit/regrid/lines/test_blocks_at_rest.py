@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
-from shockgrid.regrid.barrier.side_laws import compute_stiffness
+from shockgrid.regrid.barrier.side_inputs import compute_stiffness
 from shockgrid.regrid.barrier.tuning import DEFAULT
 from shockgrid.regrid.domains import make_domain
 from shockgrid.regrid.measure.quality import measure_quality

@@ -5,7 +5,7 @@ import pytest
 
 from shockgrid.regrid.algebraic import fill_curves
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
-from shockgrid.regrid.barrier.side_laws import fill_family_weights, weigh_curves
+from shockgrid.regrid.barrier.side_inputs import fill_family_weights, weigh_curves
 from shockgrid.regrid.barrier.tuning import DEFAULT
 from shockgrid.regrid.domains import make_domain
 from shockgrid.regrid.measure.quality import measure_first_line_gap, measure_quality

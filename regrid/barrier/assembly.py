@@ -5,7 +5,7 @@ only the second derivative of D and is positive semidefinite; a corner couples o
 direction.  The grid is in the workspace's frame; `low` is the first node column of a chunk, `cells`
 its columns of cells.
 
-All results of a row of cells go into ONE flat scratch array Z at the constant offsets named here:
+All results of a row of cells go into one flat scratch array Z at the constant offsets named here:
 rows of separate arrays, at offsets unknown to the compiler, are not vectorised.  The triangles at
 the block's own corners depend on boundary nodes alone; they must not enter e_c.
 """
@@ -38,11 +38,12 @@ NODE_ROWS = 26 * CHUNK_SPAN
 
 # Scratch of the assembly: one row each.
 #
-# COLUMN_PLACE: position of the columns by count.  LINE: edges along i between two rows of nodes;
-# entry `col` is the low edge of the cell in column `col`, entry `col + 1` its up edge.  NEAR and
-# FAR: edges along j in the first and in the second row of nodes.  X, Y, SQUARE and G are an edge
-# over its conditional length, the square of its length, and the inverse conditional length; EDGE_X
-# and EDGE_Y the edge itself; Q the weight of its straight line, FORCE the force along it.
+# COLUMN_PLACE: position of the columns by count.  LINE_X to LINE_Q: edges along i between two rows
+# of nodes; entry `col` is the low edge of the cell in column `col`, entry `col + 1` its up edge.
+# NEAR_X to NEAR_G and FAR_X to FAR_G: edges along j in the first and in the second row of nodes.
+# Of each: the edge over its conditional length, the square of its length, and the inverse
+# conditional length.  NEAR_EDGE_X and FAR_EDGE_X begin the edge itself; LINE_Q, NEAR_Q and FAR_Q
+# are the weights of straight lines, LINE_FORCE_X begins the force along i.
 (
     COLUMN_PLACE, LINE_X, LINE_Y, LINE_SQUARE, LINE_G, LINE_FORCE_X, LINE_FORCE_Y, LINE_Q,
     NEAR_X, NEAR_Y, NEAR_SQUARE, NEAR_G, FAR_X, FAR_Y, FAR_SQUARE, FAR_G,
@@ -105,7 +106,7 @@ def take_line_inputs(inputs):
 def fill_far_edges(nodes, i, along_j, blend_i, line_weight, low, cells, Z):
     """Edges along j of node row i, the cells' far ones, as they are and over their lengths.
 
-    Rows FAR_EDGE and FAR, with inverse conditional lengths and straight-line weights.
+    Into the rows FAR_X to FAR_Q, with inverse conditional lengths and straight-line weights.
     """
     x, y = nodes[0, i, low : low + cells + 1], nodes[1, i, low : low + cells + 1]
     columns = slice(low, low + cells)
@@ -346,8 +347,8 @@ def fill_cell_entries(aa, bb, ab, ba, entry, cells, here, Z):
 def fill_cell_blocks(cells, here, Z):
     """Sum the four corners of every cell into its four edges, and couple its four nodes.
 
-    The contributions of the edges go into the rows LOW, UP, NEAR and FAR (SLOPE, BLOCK), the
-    couplings across the cell into the matrix.
+    The slopes of the edges go into the rows from LOW_SLOPE_X on, their blocks into those from
+    LOW_BLOCK on, the couplings across the cell into the matrix.
     """
     for col in range(cells):
         Z[LOW_SLOPE_X + col] = Z[CORNER_1 + SLOPE_AX + col] + Z[CORNER_4 + SLOPE_AX + col]

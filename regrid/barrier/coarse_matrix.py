@@ -25,10 +25,10 @@ from shockgrid.regrid.barrier.line_cg import add_neighbour, make_solver, multipl
 from shockgrid.regrid.barrier.side_inputs import GROWTH, LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
-# Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (EAST) and along j
-# (NORTH), xx, xy, yy across the cell that begins there (ACROSS: between its nodes (i+1, j) and
-# (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node itself (OWN); the
-# inverse pivot of the line solve (PIVOT) and its factor (FACTOR).
+# Blocks of the matrix at coarse nodes: xx, xy, yx, yy to the next one along i (COARSE_EAST) and
+# along j (COARSE_NORTH), xx, xy, yy across the cell that begins there (COARSE_ACROSS: between its
+# nodes (i+1, j) and (i, j+1), with the other sign between (i, j) and (i+1, j+1)), of the node
+# itself (COARSE_OWN); the inverse pivot of the line solve and its factor.
 COARSE_EAST = 0
 COARSE_NORTH = 4
 COARSE_ACROSS = 8

@@ -13,7 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.regrid.barrier.side_inputs import LENGTH, LENGTH_CHANGE, STEP, STEP_CHANGE, fill_spacings
+from shockgrid.regrid.barrier.side_inputs import (
+    LENGTH,
+    LENGTH_CHANGE,
+    STEP,
+    STEP_CHANGE,
+    fill_spacings,
+)
 from shockgrid.regrid.measure.corners import BLOCK_CORNERS
 from shockgrid.regrid.measure.quality import compute_scaled_jacobians
 

@@ -91,7 +91,7 @@ def fill_product_row(here, before, count, Z):
 
 @inlined
 def load_direction_row(directions, beta, i, low, count, Z):
-    """Load row i of the direction as the row AFTER: from `direction` itself if `beta` is negative.
+    """Load row i of the direction after the last one: `direction` itself if `beta` is negative.
 
     Else it is `z + beta old`, also stored in `direction`; `count` columns from `low` on.
     """

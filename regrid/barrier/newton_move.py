@@ -19,7 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.regrid.algebraic import fill_displacement, fill_quasi_1d, quasi_1d_grid, transfinite_grid
+from shockgrid.regrid.algebraic import (
+    fill_displacement,
+    fill_quasi_1d,
+    quasi_1d_grid,
+    transfinite_grid,
+)
 from shockgrid.regrid.barrier.side_inputs import compute_stiffness
 from shockgrid.regrid.barrier.step_control import shorten_steps
 from shockgrid.regrid.barrier.tuning import Tuning
@@ -111,10 +116,7 @@ class NewtonMove:
             work.load_old()
             copy_sides(work.sides, work.base)
             return False
-        check = work.check_displaced_grid()
-        self.displaced_ratio = check.ratio
-        self.estimate = check.residual
-        strayed = check.strayed
+        self.displaced_ratio, self.estimate, strayed = work.check_displaced_grid()
         corrected = False
         if self.displaced_ratio > tuning.start_ratio and self._correct_smooth_error():
             strayed = np.inf

@@ -12,7 +12,7 @@ coupling of a and b is omitted, because it has opposite signs on the two sides o
 estimate is within a third of the residual if cells are not very sharp, and close to it where the
 straight lines dominate.
 
-All results of a row of cells go into ONE flat scratch array at constant offsets (otherwise
+All results of a row of cells go into one flat scratch array at constant offsets (otherwise
 nothing here vectorises).
 """
 
@@ -64,10 +64,11 @@ from shockgrid.regrid.measure.quality import find_areas, square
 # then the chunk's part of the tables along j (SPACING to CHANGE_Y are those of a `SideMotion`,
 # SIDE_LENGTH to SIDE_STEP_CHANGE those of `BarrierInputs`) and the old corner areas.
 #
-# G are inverse conditional lengths of edges, Q straight-line weights: LINE along i (entry `col` is
-# the low edge of the cell in column `col`, entry `col + 1` its up edge), NEAR and FAR along j in
-# the first and in the second row of nodes.  SLOPE and STIFFNESS are what a row of cells contributes
-# to the gradient and to the matrix along its four edges; NEAR also has the part of the row before.
+# LINE_G, NEAR_G and FAR_G are inverse conditional lengths of edges, LINE_Q, NEAR_Q and FAR_Q their
+# straight-line weights: along i (entry `col` is the low edge of the cell in column `col`, entry
+# `col + 1` its up edge), along j in the first and in the second row of nodes.  LOW_SLOPE_X to
+# FAR_STIFFNESS are what a row of cells contributes to the gradient and to the matrix along its four
+# edges; those of the near edge include the row before.
 (
     OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y, HERE_X, HERE_Y, NEXT_X, NEXT_Y,
     SPACING, SPACING_CHANGE, VALUE_X, VALUE_Y, CHANGE_X, CHANGE_Y, COLUMN_PLACE, COLUMN_BLEND,

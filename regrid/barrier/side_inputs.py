@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from regrid.algebraic import prepare_motion
-from regrid.barrier.functional import has_cell_terms
-from regrid.barrier.tuning import Weights
-from regrid.jit import kernel
-from regrid.measure.corners import count_turned_corners
-from regrid.measure.crossings import search_meeting
-from regrid.sides import J_MIN, SIDE_NAMES, compute_area, find_node
+from shockgrid.regrid.algebraic import prepare_motion
+from shockgrid.regrid.barrier.functional import has_cell_terms
+from shockgrid.regrid.barrier.tuning import Weights
+from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.measure.corners import count_turned_corners
+from shockgrid.regrid.measure.crossings import search_meeting
+from shockgrid.regrid.sides import J_MIN, SIDE_NAMES, compute_area, find_node
 
 # Rows of the tables of edges along i (one column an edge of the sides j_min and j_max) and along j:
 # conditional length and step of the edge on the first of the two sides, and their changes to the

@@ -16,7 +16,7 @@ edges exert on a node: rotation invariant like the paper's (which is not printed
 node.
 
 The lines are independent in theory R3.3, so the recurrence over i treats all lines of a chunk
-together: assembly and forward elimination are one pass.  All results of a cell go into ONE flat
+together: assembly and forward elimination are one pass.  All results of a cell go into one flat
 scratch array at constant offsets, otherwise nothing here vectorises (theory F10).
 
 Everything runs over boxes: the lines with an active node and their neighbours, each between its
@@ -57,10 +57,10 @@ from shockgrid.regrid.sides import compute_area, copy_sides, get_sides
 
 SWEEP_SPAN = 136  # length of a scratch row: a multiple of 8, not a power of two
 MOST_CHUNK_LINES = 128  # lines in a chunk; a row of nodes has one more on either side
-# Per row of nodes: position across the block, and the edges along i (LINE: entry `col` is the low
-# edge of the cell in column `col`, entry `col + 1` its up edge) and along j (NEAR, then after the
-# row FAR) over their lengths, with squares and inverse lengths.  FORCE is the force along i, with
-# the edge's weight Q and the size of the force.
+# Per row of nodes: position across the block, and the edges over their lengths, with squares and
+# inverse lengths: along i from LINE_X on (entry `col` is the low edge of the cell in column `col`,
+# entry `col + 1` its up edge), along j from NEAR_X and, after the row, from FAR_X on.  FORCE_X
+# begins the force along i, with the edge's weight and the size of the force.
 (
     COLUMN_PLACE, LINE_X, LINE_Y, LINE_SQUARE, LINE_G,
     NEAR_X, NEAR_Y, NEAR_SQUARE, NEAR_G, FAR_X, FAR_Y, FAR_SQUARE, FAR_G,
@@ -141,7 +141,7 @@ def store_node(start, sign_a, sign_b, corner, next_along_i, next_along_j, Z):
 
 @inlined
 def fill_cells(cells, Z):
-    """Six numbers for each of a cell's four nodes, from its edges in the rows LINE, NEAR, FAR."""
+    """Six numbers for each of a cell's four nodes, from the rows of its edges."""
     for col in range(cells):
         corner_1 = take_corner_terms(LINE_X + col, NEAR_X + col, Z)
         corner_2 = take_corner_terms(LINE_X + col + 1, NEAR_X + col, Z)
@@ -178,7 +178,7 @@ def fill_line_edges(x0, y0, x1, y1, spacing, pull, nodes, Z):
 
 @inlined
 def fill_far_edges(x, y, lengths, changes, u, cells, Z):
-    """Edges along j of a row of nodes at position u in 0..1, over their lengths: the rows FAR."""
+    """Edges along j of a row of nodes at position u in 0..1, over their lengths: the far ones."""
     for col in range(cells):
         inverse = 1.0 / (lengths[col] + u * changes[col])
         dx, dy = (x[col + 1] - x[col]) * inverse, (y[col + 1] - y[col]) * inverse
@@ -338,7 +338,7 @@ def fill_directions(nodes, tables, numbers, boxes, kept, Z, out, per_line):
 def substitute_back(kept, box, Z, out):
     """D[i] = inverse (right + q D[i+1]) from the last row of the box to the first.
 
-    D of the row before is kept in the rows LINE.
+    D of the last row is kept in LINE_X and LINE_Y.
     """
     first_line, stop_line, first_row, stop_row = box
     lines = stop_line - first_line

@@ -22,7 +22,14 @@ import numpy as np
 
 from shockgrid.regrid.measure.corners import find_folded_cells
 from shockgrid.regrid.sides import compute_area, copy_sides
-from shockgrid.regrid.symmetry import TURNS, Turn, even_out_grid, find_mean_length, is_even, turn_departure
+from shockgrid.regrid.symmetry import (
+    TURNS,
+    Turn,
+    even_out_grid,
+    find_mean_length,
+    is_even,
+    turn_departure,
+)
 
 SAME_LENGTH = 1e-5  # of the mean length: up to which grids differ by magnified rounding only
 GOLDEN_FRACTION = 0.6180339887498949  # its multiples weigh lengths; no two weights agree

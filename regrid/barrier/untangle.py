@@ -216,8 +216,8 @@ class Unfolding(Enum):
     """How a grid is unfolded that is far from any known one (theory R5.4).
 
     STRAIGHT: with straight lines, by `untangle`; GRADED: without them, every edge with the length
-    that the sides ask for; EVEN: with two lengths for all.  With SPREAD the grid is a nearly
-    harmonic map at first.
+    that the sides ask for; EVEN: with two lengths for all.  GRADED_SPREAD and EVEN_SPREAD begin
+    with a nearly harmonic map.
     """
 
     STRAIGHT = 0

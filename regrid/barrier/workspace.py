@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -37,7 +37,12 @@ from shockgrid.regrid.barrier.residual_estimate import (
     check_residual_threaded,
 )
 from shockgrid.regrid.barrier.side_inputs import BarrierInputs, prepare, weigh_curves
-from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, MOST_CHUNK_NODES, UPRIGHT, measure_corners
+from shockgrid.regrid.barrier.step_control import (
+    CHUNK_SPAN,
+    MOST_CHUNK_NODES,
+    UPRIGHT,
+    measure_corners,
+)
 from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
 from shockgrid.regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
 from shockgrid.regrid.jit import can_use_threads
@@ -51,29 +56,8 @@ from shockgrid.regrid.work_arrays import Carver, count_numbers, share_memory
 VECTORS = ("solution", "r", "z", "p", "p_old", "product")  # of the solve
 LEAST_SPACING_DEPARTURE = 1e-12  # departures of spacings below it are round-off
 LEAST_CHUNK_COLUMNS = 8  # a thread is not worth starting for fewer
-VECTOR_LENGTH = 8  # numbers in a cache line, and in the longest vectors of a processor
+NUMBERS_PER_VECTOR = 8  # numbers in a cache line, and in the longest vectors of a processor
 MOST_SOLVE_ITERATIONS = 16
-
-
-class GivenGrids(NamedTuple):
-    """Grids of a regrid in a frame other than the workspace's: the old one, and what is filled."""
-
-    old: np.ndarray
-    result: np.ndarray
-    frame: tuple[bool, bool]
-
-
-class ResidualCheck(NamedTuple):
-    """What the residual check finds of the displaced grid.
-
-    `ratio`: the least ratio of its corner areas to the old ones, 0 unless all areas are positive
-    numbers; `residual`: an estimate of its residual in cells; `strayed`: how far inner nodes are
-    from interpolated positions at most, in old cell heights.  The latter two may be infinite.
-    """
-
-    ratio: float
-    residual: float
-    strayed: float
 
 
 def load_grid(nodes, out, transposed: bool, mirrored: bool, inside: bool) -> None:
@@ -186,7 +170,7 @@ class Workspace:
         # Vectors of the solve have columns of zeros behind the last one, so that its loops run over
         # whole vectors of the processor: a few columns more would take as long as the others.
         self.whole_columns = self.columns.copy()
-        self.whole_columns[-1] += -(self.nj - self.columns[-2]) % VECTOR_LENGTH
+        self.whole_columns[-1] += -(self.nj - self.columns[-2]) % NUMBERS_PER_VECTOR
         self.extremes = np.zeros((chunks, 5))
         shape = chunks, max(ENERGY_ROWS, RESIDUAL_ROWS)
         self.scratch = Carver(np.zeros(count_numbers(*shape))).cut(*shape)
@@ -198,7 +182,7 @@ class Workspace:
         """
         chunks = self.columns.size - 1
         columns = int(self.whole_columns[-1]) + 1
-        vector_shape = (2, self.ni + 1, -(-columns // VECTOR_LENGTH) * VECTOR_LENGTH)
+        vector_shape = (2, self.ni + 1, -(-columns // NUMBERS_PER_VECTOR) * NUMBERS_PER_VECTOR)
         self.totals = np.zeros(vector_shape[2])
         grids = ("old_array", "sides_array", "base_array", "trial_array")
         self.arrays = {
@@ -252,7 +236,8 @@ class Workspace:
         self.base = self.base_array
         self.trial = self.trial_array
         self.frame = UPRIGHT
-        self.given: GivenGrids | None = None
+        # the old grid, the one to fill, and the frame of both, if that is not the workspace's
+        self.framed_grids: tuple[np.ndarray, np.ndarray, tuple[bool, bool]] | None = None
 
     def take(
         self, previous, boundary, transposed, mirrored, sound=None, into=None, first_grid=None
@@ -278,7 +263,7 @@ class Workspace:
             load_grid(boundary, self.sides, *self.frame, inside=False)
             if previous is not None:
                 load_grid(previous, self.old, *self.frame, inside=False)
-                self.given = GivenGrids(previous, self.into, self.frame)
+                self.framed_grids = (previous, self.into, self.frame)
         if sound is not None:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
         self.spacing = None
@@ -290,10 +275,10 @@ class Workspace:
     def load_old(self) -> None:
         """Copy the grid before to `old`, and the displaced one to `base`, if a residual check has
         them in another frame."""
-        if self.given is not None:
-            load_grid(self.given.old, self.old, *self.frame, inside=True)
+        if self.framed_grids is not None:
+            load_grid(self.framed_grids[0], self.old, *self.frame, inside=True)
             load_grid(self.into, self.base, *self.frame, inside=True)
-            self.given = None
+            self.framed_grids = None
 
     def copy_to_arrays(self, old: np.ndarray, sides: np.ndarray) -> None:
         """Let `old` and `sides` be copies of these grids that may be written to."""
@@ -307,7 +292,7 @@ class Workspace:
 
         The residual check has already written it there if nothing else was needed.
         """
-        if self.given is None and self.trial is not self.into:
+        if self.framed_grids is None and self.trial is not self.into:
             transposed, mirrored = self.frame
             source = self.trial[::-1] if mirrored else self.trial
             self.into[:] = source.transpose(0, 2, 1) if transposed else source
@@ -396,17 +381,19 @@ class Workspace:
         if self.departs:
             self.spacing_departure = spacing_departure
 
-    def check_displaced_grid(self) -> ResidualCheck:
+    def check_displaced_grid(self) -> tuple[float, float, float]:
         """Move `old` along with its sides (R6.5) into `base`, and estimate its residual.
 
-        The residual is infinite where areas are not positive, and where a spacing is kept.
+        Returns the least ratio of its corner areas to the old ones, 0 unless all areas are positive
+        numbers; an estimate of its residual in cells, infinite then, and where a spacing is kept;
+        how far inner nodes are from interpolated positions at most, in old cell heights.
         """
         check = check_residual_serial
         if self._set_threads():
             check = check_residual_threaded
         grids = (self.old, self.base, UPRIGHT)
-        if self.given is not None:
-            grids = tuple(self.given)
+        if self.framed_grids is not None:
+            grids = self.framed_grids
         total, self.marks = check.entry(
             self.base, grids, self.inputs, self.motion, (self.coarse.starts_i, self.coarse.sums),
             self.totals, (self.columns, self.extremes, self.scratch),
@@ -417,12 +404,12 @@ class Workspace:
         if not (is_convex and shrunk > 0.0 and total >= 0.0):
             self.load_old()
             ratio = self.compare_corners(self.base, self.old) if is_convex else 0.0
-            return ResidualCheck(ratio, math.inf, math.inf)
+            return ratio, math.inf, math.inf
         if self.spacing is not None:  # the estimate knows of the sides' lengths alone
-            return ResidualCheck(float(1.0 / shrunk), math.inf, math.inf)
+            return float(1.0 / shrunk), math.inf, math.inf
         inner = (self.ni - 1) * (self.nj - 1)
         residual = math.sqrt(total / (self.sigma * inner))
-        return ResidualCheck(float(1.0 / shrunk), residual, float(extremes[STRAYED]))
+        return float(1.0 / shrunk), residual, float(extremes[STRAYED])
 
     def get_quality(self) -> tuple[float, float, int, int] | None:
         """What `measure_worst` says of the grid checked last, if all its corners are positive."""

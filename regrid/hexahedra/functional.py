@@ -7,11 +7,11 @@ products of all eight corners are positive in a valid cell.  The corner formulas
 squares of edges and of their cross products over the volume.  Only the smoothed denominator is the
 same.
 
-All results of a row of cells go into ONE flat scratch array Z at the constant offsets named here:
+All results of a row of cells go into one flat scratch array Z at the constant offsets named here:
 rows of separate arrays, at offsets unknown to the compiler, are not vectorised.  Edges are stored
 there divided by their conditional lengths, three rows per vector.
 
-The straight-line weights `ways` are those of an edge in ONE of its four cells.  Edges in a face
+The straight-line weights `ways` are those of an edge in one of its four cells.  Edges in a face
 have fewer cells, which affects boundary nodes only; their residual is not used.  Note: a row of
 cells adds to four rows of nodes, so rows are processed in one fixed order; and `strength` is frozen
 in a step, so that a line search compares the same functional.

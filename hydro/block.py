@@ -19,7 +19,7 @@ from shockgrid.hydro.eos.base import check_eos, check_formulas
 from shockgrid.hydro.eos.conversion import compute_energy, compute_temperature
 from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry, compute_volumes
-from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
+from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, limit_gently, limit_van_leer
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
 from shockgrid.hydro.interior.advance import count_tiles
 from shockgrid.hydro.interior.cell_fields import (
@@ -35,6 +35,8 @@ from shockgrid.hydro.perimeter.contacts import fill_open_flux
 from shockgrid.hydro.perimeter.plan import PerimeterPlan
 from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
 from shockgrid.hydro.rows import HELD_ARRAYS, RHO, P, make_held
+from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.stress import Stress, add_stress_fields, stiffen_wave_law
 from shockgrid.hydro.totals import TileTotals
 from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.measure.corners import compute_centres
@@ -101,6 +103,8 @@ class Block:
     skewed grid lines leave behind a shock, but smears contacts inside the block.
     carried: fields that move with the mass, `hydro.carried`; their values are in `carried`
     (fields, ni + 2, nj + 2).
+    strength: law of a solid, `hydro.strength.laws`; its stress and plastic strain are then the
+    first carried fields.  None: a fluid.
     Raises BadInput for a grid with a bad cell, for a density or sound speed that is not positive,
     and for an equation of state whose formulas disagree.
     """
@@ -119,6 +123,7 @@ class Block:
         limiter: str = DEFAULT_LIMITER,
         flux: str = DEFAULT_FLUX,
         carried: Sequence[CarriedField] = (),
+        strength: StrengthLaw | None = None,
     ):
         _check_name(name, "a block")
         _check_name(material or name, f"the material of block {name!r}", other=",")
@@ -146,6 +151,11 @@ class Block:
         for array_name, array in make_held(self.ni, self.nj).items():
             setattr(self, array_name, held[array_name])
             setattr(self, f"{array_name}_new", array)
+        self.strength = strength
+        self.stress: Stress | None = None
+        if strength is not None:
+            carried = add_stress_fields(name, eos, tuple(carried))
+            self.stress = Stress(strength, self.ni, self.nj)
         self._carry(carried)
         self.mixed = self._mix(eos, limiter, flux) if isinstance(eos, Mixture) else None
         self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
@@ -153,9 +163,11 @@ class Block:
         # a user's own need not be
         self.parameters = _read_parameters(eos)
         self.wave_law = tuple(float(value) for value in eos.wave_law)
+        if strength is not None:
+            self.wave_law = stiffen_wave_law(self.wave_law, eos, strength)
         self.limiter = limiter
         self.flux_name = flux
-        self.kernels = BlockKernels(type(eos), limiter, flux)
+        self.kernels = BlockKernels(type(eos), limiter, flux, strength is not None)
         # which cells this process updates, and whether it holds all of them (`hydro.ranks`)
         self.update_rows_only(0, self.ni)
         self.is_here = True
@@ -193,8 +205,9 @@ class Block:
         self.carried_new = np.zeros(self.carried.shape)
         for number, field in enumerate(fields):
             self.carried[number, 1:-1, 1:-1] = field.find_first(self.name, self.centres)
+        limit = limit_van_leer if self.stress is None else limit_gently
         moved = 0 if isinstance(self.eos, Mixture) else len(fields)  # fractions move by themselves
-        self.transport = Transport(moved, self.ni, self.nj)
+        self.transport = Transport(moved, self.ni, self.nj, limit)
         self.held_arrays = (*HELD_ARRAYS, "carried") if fields else HELD_ARRAYS
         self.step_arrays = ("nodes", *self.held_arrays, "rates")
         self.units = UNITS | {field.name: field.unit for field in fields}

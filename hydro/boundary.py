@@ -37,6 +37,7 @@ from shockgrid.hydro.perimeter.contacts import (
 )
 from shockgrid.hydro.rim import CARRIED_BEYOND, CARRIED_GHOST, GHOST, RHO_BEYOND, RHO_TRACE, STATE
 from shockgrid.hydro.rows import RHO
+from shockgrid.hydro.strength.stress import STRESS_FIELDS
 from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.plug_ins import PlugIns
 
@@ -227,6 +228,8 @@ class Inflow(Segment):
 
     def __init__(self, block, side, start, stop, state, velocity=None, carried=None):
         super().__init__(block, side, start, stop)
+        if block.stress is not None:  # solid comes in without stress where nothing is said
+            carried = dict.fromkeys((field.name for field in STRESS_FIELDS), 0.0) | (carried or {})
         values = read_values(f"{self}: inflow segment", block.carried_fields, carried)
         self._carried = values[:, None]
         self.state = state if callable(state) else (lambda t: state)
@@ -357,20 +360,25 @@ class Linked(Segment):
     """
 
     linked = True
+    sticks: bool = False  # do solids on both sides share what acts along the line?
 
 
 class Interface(Linked):
     """Contact of two materials with matching nodes: a grid line that both blocks share.
 
-    tension: surface tension [N/m], `hydro.motion.tension`.
+    tension: surface tension [N/m], `hydro.motion.tension`; bonded: do solids on both sides stick
+    together?  By default they slip on each other without friction.
     """
 
     kind = "interface"
     motion = NodeMotion.FLOW
 
-    def __init__(self, block, side, start, stop, tension=0.0):
+    def __init__(self, block, side, start, stop, tension=0.0, bonded=False):
         super().__init__(block, side, start, stop)
         self.tension = self.check_tension(tension)
+        if not isinstance(bonded, bool):
+            raise BadInput(f"{self}: interface: bonded = {bonded!r}; it is true or false")
+        self.bonded = self.sticks = bonded
 
 
 class Sliding(Linked):
@@ -392,6 +400,7 @@ class Seam(Linked):
     kind = "seam"
     motion = NodeMotion.JOIN
     ends_flow = True
+    sticks = True
 
 
 class Periodic(Seam):

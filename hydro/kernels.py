@@ -1,7 +1,7 @@
 """The kernels of a block's phases, and their scratch.
 
-They are made for an equation of state, a limiter, a flux and a geometry; blocks that agree in these
-share them.
+They are made for an equation of state, a limiter, a flux and a geometry, with stress or without;
+blocks that agree in these share them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ class BlockKernels:
     scratch: of the rows of cells, as `hydro.interior.scratch` lays it out, once a thread.
     """
 
-    def __init__(self, eos_class: type, limiter: str, flux: str):
+    def __init__(self, eos_class: type, limiter: str, flux: str, is_solid: bool = False):
         self.eos_class = eos_class
+        self.is_solid = is_solid
         self.limiter = limiter
         self.flux = flux
         self.geometry = PLANE
@@ -49,5 +50,6 @@ class BlockKernels:
     def _choose(self) -> None:
         limiter = FIRST_ORDER_LIMITER if self.is_first_order else self.limiter
         variant: tuple[Any, ...] = self.eos_class, limiter, self.geometry, self.flux
+        variant = (*variant, self.is_solid)
         self.flow = make_flow_kernels(*variant)
         self.sides = make_side_kernels(*variant)

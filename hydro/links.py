@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.boundary import Linked, Seam, Sliding, put
+from shockgrid.hydro.boundary import Interface, Linked, Seam, Sliding, put
 from shockgrid.hydro.carried.fields import check_same
 from shockgrid.hydro.eos.base import is_same_material
 from shockgrid.hydro.perimeter.contacts import (
@@ -26,6 +26,7 @@ from shockgrid.hydro.perimeter.contacts import (
     solve_link,
 )
 from shockgrid.hydro.sliding.contact import SlidingContact
+from shockgrid.hydro.strength.sides import stick_together
 from shockgrid.regrid.errors import BadInput
 
 # of the least of the cells' edges beside a link: nodes of both sides so near are one
@@ -78,6 +79,16 @@ class Link:
         # beside those of its contact, and whether the line is closed
         self.layer = np.empty((2, 0)), False
         self.passes_mass = isinstance(leader, Seam)
+        # of solids that stick together: seams and bonds
+        self._sticking: tuple | None = None
+        one_stress = leader.block.stress
+        two_stress = follower.block.stress
+        if one_stress is not None and two_stress is not None and leader.sticks:
+            self._sticking = (
+                one_stress.list_for_link(leader.block),
+                two_stress.list_for_link(follower.block),
+                pairs,
+            )
         # make matching nodes bitwise equal
         follower_line[...] = self.arrange_for_follower(leader_line)
 
@@ -95,6 +106,8 @@ class Link:
             solve_link.entry(*self._rims, *self._wave_laws, layer, phase, curved)
         elif phase != AT_TRACES:
             pass_seam(*self._rims, phase, curved)
+        if self._sticking is not None:
+            stick_together(*self._sticking, phase, self.passes_mass, curved)
 
     def copy_line_to_follower(self) -> None:
         """Copy the leader's new nodes to the follower."""
@@ -103,9 +116,20 @@ class Link:
 
 
 def _check_materials(leader: Linked, follower: Linked) -> None:
-    """Raise BadInput where a seam joins two materials."""
+    """Raise BadInput where a seam joins two materials, and for a bond of what bears no shear."""
     leader_eos = leader.block.eos
     follower_eos = follower.block.eos
+    for segment in (leader, follower):
+        if isinstance(leader, Interface) and leader.bonded and segment.block.strength is None:
+            raise BadInput(
+                f"{leader.kind}: {leader} and {follower} are bonded, and the material of block "
+                f"{segment.block.name!r} has no strength; only solids bear shear"
+            )
+    if isinstance(leader, Seam) and leader.block.strength != follower.block.strength:
+        raise BadInput(
+            f"{leader.kind}: material passes between {leader} and {follower}, and its strength "
+            f"differs: {leader.block.strength} and {follower.block.strength}"
+        )
     if isinstance(leader, Seam) and not is_same_material(leader_eos, follower_eos):
         raise BadInput(
             f"{leader.kind}: material passes between {leader} and {follower}, and their equations "

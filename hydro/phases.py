@@ -30,6 +30,8 @@ def gather(block: Block, t: float = 0.0) -> None:
     )  # fmt: skip
     if block.transport.count:
         block.transport.gather(block)
+    if block.stress is not None:
+        block.stress.start(block)
     if block.body_acceleration is not None:
         _add_weight(block, block.body_acceleration)
 
@@ -51,11 +53,15 @@ def predict(block: Block, dt: float) -> None:
         block.mixed.predict(block, 0.5 * dt)
         return
     kernels = block.kernels
+    if block.stress is not None:
+        block.stress.predict(block, dt)
     kernels.sides.predict_sides.entry(
         _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,
         block.rim.rows,
     )  # fmt: skip
-    if block.transport.count:
+    if block.stress is not None:
+        block.stress.trace_moving(block)
+    elif block.transport.count:
         block.transport.predict(block, 0.5 * dt)
 
 
@@ -71,6 +77,8 @@ def trace(block: Block, dt: float) -> None:
     )  # fmt: skip
     if block.transport.count:
         block.transport.trace(block)
+    if block.stress is not None:
+        block.stress.trace(block)
 
 
 def update(block: Block, dt: float, threads: int = 1) -> None:
@@ -87,6 +95,8 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     if threads > 1:
         kernels.use_threads(threads)
     block.totals.start_update()
+    if block.stress is not None:
+        block.stress.prepare(block)
     advance = kernels.flow.advance_threaded if threads > 1 else kernels.flow.advance
     advance.entry(
         _list_old(block), (*_list_new(block), *block.transport.masses), block.rim.rows, dt,
@@ -94,6 +104,8 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     )  # fmt: skip
     if block.transport.count:
         block.transport.carry(block, dt)
+    if block.stress is not None:
+        block.stress.relax(block, dt)
     if block.is_follower and not block.is_cut:
         fill_polygons(block)
 
@@ -107,7 +119,12 @@ def fill_polygons(block: Block) -> None:
 
 
 def _list_old(block: Block) -> tuple[np.ndarray, ...]:
-    """Kernel input at the start of the step: what cells hold (HELD_ARRAYS), then nodes."""
+    """Kernel input at the start of the step: what cells hold (HELD_ARRAYS), then nodes.
+
+    Of a solid, then the arrays of its stress.
+    """
+    if block.stress is not None:
+        return *block.list_starts(), block.nodes, block.stress.arrays  # type: ignore[return-value]
     return *block.list_starts(), block.nodes
 
 

@@ -38,6 +38,8 @@ from shockgrid.hydro.crowding import (
 )
 from shockgrid.hydro.eos.conversion import has_voids, make_conversion
 from shockgrid.hydro.formulas.geometry import Geometry
+from shockgrid.hydro.formulas.strength import add_shear_wave
+from shockgrid.hydro.interior.solid import NO_SHEAR
 from shockgrid.hydro.interior.update import compute_rate
 from shockgrid.hydro.perimeter.faces import measure_lines, measure_volume
 from shockgrid.hydro.ranks.blocks import Blocks
@@ -362,11 +364,12 @@ def make_redistribution(eos_class, geometry: Geometry):
             total[q] = (total[q] + own_value) * inverse_count + amounts[KEPT, q, i, j]
 
     @kernel
-    def redistribute(squeezed, grids, excess, inverse_dt, parameters, before, after, scratch):
+    def redistribute(squeezed, grids, excess, inverse_dt, materials, before, after, scratch):
         """State redistribution of cells `small` (n, 2) over neighbourhoods `reaches` (ni, nj).
 
         squeezed: (small, reaches); grids: nodes (2, ni + 1, nj + 1) before and after the step;
-        excess (faces,): volume of perimeter cells beyond their straight faces; before: the arrays
+        excess (faces,): volume of perimeter cells beyond their straight faces; materials:
+        parameters, and the shear modulus of a solid (ni, nj), else (1, 1); before: the arrays
         of HELD_ARRAYS that the step started from, and carried fields (n, ni + 2, nj + 2); after:
         these and rates (ni, nj), updated in place; scratch: marks (ni, nj), zero on entry and exit,
         and the records of all cells, amounts (4, 4 + n, ni, nj) and sizes (3, ni, nj).  Returns the
@@ -378,6 +381,8 @@ def make_redistribution(eos_class, geometry: Geometry):
         amounts, sizes = record
         held_before, carried_before = before
         held, carried, rates = after
+        parameters, shear = materials
+        is_solid = shear.shape[0] > 1
         ni, nj = rates.shape
         # the cells concerned, and what each gives and keeps of its conserved quantities
         touched = [(0, 0)]
@@ -430,7 +435,10 @@ def make_redistribution(eos_class, geometry: Geometry):
             u -= 0.25 * w_x * inverse_dt
             v -= 0.25 * w_y * inverse_dt
             area *= find_volume_factor(nodes_new, excess, i, j, ni, nj)
-            rates[i, j], _ = compute_rate(u, v, max(c2, 0.0), xi, yi, xj, yj, 1.0 / area)
+            c2 = max(c2, 0.0)
+            if is_solid:
+                c2 = add_shear_wave(c2, shear[i, j], rho)
+            rates[i, j], _ = compute_rate(u, v, c2, xi, yi, xj, yj, 1.0 / area)
         # the marks are zero again, as the next call expects them
         for i, j in touched:
             marks[i, j] = 0
@@ -506,9 +514,11 @@ class BlockRedistribution:
         self.fill_reaches(
             squeezed, block.rates, limit, block.nodes, block.excess_volume, self.reaches
         )
+        shear = NO_SHEAR if block.stress is None else block.stress.arrays.shear
         block.redistributed_cells, least_c2, voided = self.redistribute(
             (squeezed, self.reaches), (block.nodes, block.nodes_new), block.excess_volume_new,
-            inverse_dt, block.parameters, (tuple(block.list_starts()), block.get_start("carried")),
+            inverse_dt, (block.parameters, shear),
+            (tuple(block.list_starts()), block.get_start("carried")),
             (tuple(block.list_new()), block.carried_new, block.rates_new),
             (self.marks, self.record),
         )  # fmt: skip

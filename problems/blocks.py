@@ -25,10 +25,18 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.carried.fields import CarriedField
 from shockgrid.hydro.contacts.necks import Necks
-from shockgrid.hydro.eos.materials import Material, find_material, find_name, make_material
+from shockgrid.hydro.eos.materials import (
+    Material,
+    check_solid,
+    find_material,
+    find_name,
+    make_material,
+    make_strength,
+)
 from shockgrid.hydro.links import join, slide
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.sources import make_gravity
+from shockgrid.hydro.strength.laws import StrengthLaw
 from shockgrid.problems.deck import (
     NONE,
     Coordinate,
@@ -141,6 +149,11 @@ class BlockTable(DeckTable, kw_only=True):
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
     p: key(Formula, "pressure [Pa], of x and y") = 1e5
     carried: key(tuple[CarriedTable, ...], "fields that its cells carry with their mass") = ()
+    strength: key(
+        bool | Numbers,
+        "true: it bears shear, by the material's strength_law; or a table such as {law = "
+        '"perfect", shear_modulus = ..., yield_strength = ...} [Pa]',
+    ) = False
     side: key(tuple[BlockSide, ...], "what is at its sides that are not linked") = ()
 
 
@@ -154,6 +167,7 @@ class LinkTable(DeckTable, kw_only=True):
     )
     sides: key(tuple[str, str], 'two, such as "left.i_max" or "left.i_max[0:8]", faces 0 to 7')
     tension: key(float, "surface tension of an interface [N/m]", ge=0, le=1e20) = 0.0
+    bonded: key(bool, "solids on both sides of an interface stick together") = False
 
 
 CHANNEL = BlockTable(  # air that a piston drives into a channel with a bump
@@ -360,6 +374,10 @@ class Blocks(Problem):
         for link in deck.link:
             if link.tension and link.kind == "slide":
                 raise BadInput(f"deck: link: {link.sides}: a sliding contact has no tension")
+            if link.bonded and link.kind != "interface":
+                raise BadInput(
+                    f"deck: link: {link.sides}: bonded is for interfaces; a {link.kind} is none"
+                )
         self.units = {f"{what}_{name}": unit for name in names for what, unit in MEASURED.items()}
 
     @functools.cached_property
@@ -410,7 +428,9 @@ class Blocks(Problem):
                     raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
                 faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
                 pair.append((blocks[name], found["side"], *faces))
-            options = {"tension": link.tension} if link.tension else {}
+            options: dict[str, Any] = {"tension": link.tension} if link.tension else {}
+            if link.bonded:
+                options["bonded"] = True
             slides = link.kind == "slide"
             links.append(slide(*pair) if slides else join(link.kind, *pair, **options))
         flow = self.simulate(
@@ -445,6 +465,7 @@ class Blocks(Problem):
             for field in table.carried
         ]
         options = {"material": label, "limiter": self.deck.limiter, "carried": carried}
+        options["strength"] = find_strength(table, material, where)
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():
@@ -494,6 +515,21 @@ def find_block_material(block: BlockTable) -> Material:
         return find_material(block.material)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
+
+
+def find_strength(block: BlockTable, material: Material, where: str) -> StrengthLaw | None:
+    """The law of strength that a block asks for, None for a fluid; BadInput where it has none."""
+    if isinstance(block.strength, dict):
+        return make_strength(f"{where}, strength", block.strength, material.eos, material.rho0)
+    if not block.strength:
+        return None
+    check_solid(f"{where}, strength", material.eos)
+    if material.strength is None:
+        raise BadInput(
+            f"{where}: strength = true, and its material has no strength_law; give a table such "
+            'as {law = "perfect", shear_modulus = ..., yield_strength = ...} [Pa]'
+        )
+    return material.strength
 
 
 def collect_options(side: BlockSide, where: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ bit.  Slopes are bounded: at no corner of a cell is its field beyond the values 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -92,29 +93,9 @@ def place_ghosts(rim, row, field):
         field[k + 1, nj + 1] = rim[row, 2 * nj + ni + k]
 
 
-@functools.cache
-def make_predict(geometry: Geometry):
-    """Kernel that fills the slopes of carried fields, of a geometry."""
+def make_difference_weights(geometry: Geometry):
+    """Formula for the weights of the differences of a cell to those before and after."""
     curved = geometry.curved
-
-    @compiled_once(allocates=False)
-    def measure_cell(nodes, i, j, measures, centres):
-        """Lengths, shifts and the centre of a cell."""
-        a, b, c, d = find_corners(nodes, i, j)
-        mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
-        length_i = (mid_i[0] * mid_i[0] + mid_i[1] * mid_i[1]) ** 0.5
-        length_j = (mid_j[0] * mid_j[0] + mid_j[1] * mid_j[1]) ** 0.5
-        offset_x = 0.0
-        offset_y = 0.0
-        if curved:
-            twist, y = find_twist(a, b, c, d)
-            offset_x, offset_y = compute_centre_offset(mid_i, mid_j, twist, y)
-        measures[LENGTH_I, i + 1, j + 1] = length_i
-        measures[LENGTH_J, i + 1, j + 1] = length_j
-        measures[SHIFT_I, i + 1, j + 1] = (offset_x * mid_i[0] + offset_y * mid_i[1]) / length_i
-        measures[SHIFT_J, i + 1, j + 1] = (offset_x * mid_j[0] + offset_y * mid_j[1]) / length_j
-        centres[0, i, j] = 0.25 * ((a[0] + c[0]) + (b[0] + d[0])) + offset_x
-        centres[1, i, j] = 0.25 * ((a[1] + c[1]) + (b[1] + d[1])) + offset_y
 
     @inlined
     def weigh(measures, length, here, before, after):
@@ -134,6 +115,34 @@ def make_predict(geometry: Geometry):
             measures[length, here[0], here[1]],
             measures[length, after[0], after[1]],
         )
+
+    return weigh
+
+
+@functools.cache
+def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
+    """Kernel that fills the slopes of carried fields, of a geometry and a limiter's formula."""
+    curved = geometry.curved
+    weigh = make_difference_weights(geometry)
+
+    @compiled_once(allocates=False)
+    def measure_cell(nodes, i, j, measures, centres):
+        """Lengths, shifts and the centre of a cell."""
+        a, b, c, d = find_corners(nodes, i, j)
+        mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
+        length_i = (mid_i[0] * mid_i[0] + mid_i[1] * mid_i[1]) ** 0.5
+        length_j = (mid_j[0] * mid_j[0] + mid_j[1] * mid_j[1]) ** 0.5
+        offset_x = 0.0
+        offset_y = 0.0
+        if curved:
+            twist, y = find_twist(a, b, c, d)
+            offset_x, offset_y = compute_centre_offset(mid_i, mid_j, twist, y)
+        measures[LENGTH_I, i + 1, j + 1] = length_i
+        measures[LENGTH_J, i + 1, j + 1] = length_j
+        measures[SHIFT_I, i + 1, j + 1] = (offset_x * mid_i[0] + offset_y * mid_i[1]) / length_i
+        measures[SHIFT_J, i + 1, j + 1] = (offset_x * mid_j[0] + offset_y * mid_j[1]) / length_j
+        centres[0, i, j] = 0.25 * ((a[0] + c[0]) + (b[0] + d[0])) + offset_x
+        centres[1, i, j] = 0.25 * ((a[1] + c[1]) + (b[1] + d[1])) + offset_y
 
     @compiled_once(allocates=False)
     def fill_slope(field, state, nodes, i, j, half_dt, lines, slopes):
@@ -156,9 +165,9 @@ def make_predict(geometry: Geometry):
         below = field[i + 1, j]
         above = field[i + 1, j + 2]
         first, second = weigh(measures, LENGTH_I, here, (i, j + 1), (i + 2, j + 1))
-        along_i = limit_van_leer((value - before) * first, (after - value) * second)
+        along_i = limit((value - before) * first, (after - value) * second)
         first, second = weigh(measures, LENGTH_J, here, (i + 1, j), (i + 1, j + 2))
-        along_j = limit_van_leer((value - below) * first, (above - value) * second)
+        along_j = limit((value - below) * first, (above - value) * second)
         slope_x, slope_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
         # nowhere in the cell beyond the values around
         least = min(value, min(min(before, after), min(below, above)))
@@ -353,11 +362,13 @@ class Transport:
     Its phases, in their order, are called where there are fields.
 
     count: how many fields; masses: rates of mass through the faces, which the flow's update fills,
-    (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; without fields (1, 1), and not filled.
+    (ni + 1, nj) towards +i and (ni, nj + 1) towards +j; without fields (1, 1), and not filled;
+    limit: formula of the limiter.
     """
 
-    def __init__(self, count: int, ni: int, nj: int):
+    def __init__(self, count: int, ni: int, nj: int, limit: Callable = limit_van_leer):
         self.count = count
+        self.limit = limit
         self.masses = np.zeros((1, 1)), np.zeros((1, 1))
         if count == 0:
             return
@@ -373,7 +384,7 @@ class Transport:
 
     def predict(self, block: Any, half_dt: float) -> None:
         """Phase 2, after the couplings: slopes and values at mid-time."""
-        predict = make_predict(block.geometry)
+        predict = make_predict(block.geometry, self.limit)
         predict(
             block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
             (block.rows.start, block.rows.stop), (self.measures, self.centres, self.slopes),

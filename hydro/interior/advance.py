@@ -26,6 +26,7 @@ from shockgrid.hydro.interior.faces import (
     make_faces,
     make_flux,
     make_hll_flux,
+    make_shear_flux,
     make_traces,
     make_upwind,
 )
@@ -35,6 +36,7 @@ from shockgrid.hydro.interior.scratch import (
     copy_back,
     copy_row,
     copy_rows,
+    copy_rows_back,
     prefetch_row,
     prefetch_rows,
 )
@@ -75,51 +77,79 @@ def make_flow_kernels(
     limiter: str = DEFAULT_LIMITER,
     geometry: Geometry = PLANE,
     flux: str = DEFAULT_FLUX,
+    is_solid: bool = False,
 ) -> FlowKernels:
     """Kernels of an `EquationOfState` class, a limiter (LIMITERS of `formulas.reconstruction`), a
-    geometry and a flux (HLL_JUMP_THRESHOLDS of `formulas.riemann`)."""
+    geometry and a flux (HLL_JUMP_THRESHOLDS of `formulas.riemann`); `is_solid`: the material has
+    strength, and `old` of the kernels ends with its `hydro.interior.solid.SolidArrays`."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter in LOW_MACH
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
-    measure_after, next_row, reconstruct, _ = make_row_phases(eos_class, limiter, geometry, flux)
+    measure_after, next_row, reconstruct, _ = make_row_phases(
+        eos_class, limiter, geometry, flux, is_solid
+    )
     fill_faces_i = make_faces(geometry.face, scratch.X_HIGH, scratch.X_HIGH + 1, scratch.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, scratch.X_HIGH, scratch.X_LOW, scratch.AREA_X_J)
-    gather_flux = make_update(eos_class, geometry, finishes=False, gathers=True)
-    update_rows = make_update(eos_class, geometry, finishes=True, gathers=True)
-    fill_new_state = make_update(eos_class, geometry, finishes=True, gathers=False)
-    fill_traces_in, fill_traces = make_traces(sound, opens_voids)
+    gather_flux = make_update(eos_class, geometry, False, True, is_solid)
+    update_rows = make_update(eos_class, geometry, True, True, is_solid)
+    fill_new_state = make_update(eos_class, geometry, True, False, is_solid)
+    fill_traces_in, fill_traces = make_traces(sound, opens_voids, is_solid)
     pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
     i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
-    # the cell below the face of entry k is that of entry k - 1
     j_faces = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
+    force_i, force_j = (scratch.FORCE_I_X, scratch.FORCE_J_X) if is_solid else (0, 0)
+    choice = low_mach, opens_voids
     fill_upwind_i = make_upwind(
-        *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, low_mach, opens_voids
+        *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, *choice, force_i
     )
     fill_upwind_j = make_upwind(
-        *j_faces, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1, low_mach, opens_voids
+        *j_faces, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1, *choice, force_j
     )
     voids = opens_voids, make_leaving_part(eos_class)
-    fill_flux_i = make_flux(energy, scratch.AREA_X_I, scratch.FLUX_I_MASS, pressure_i, *voids)
-    fill_flux_j = make_flux(energy, scratch.AREA_X_J, scratch.FLUX_J_MASS, pressure_j, *voids)
+    fill_flux_i = make_flux(
+        energy, scratch.AREA_X_I, scratch.FLUX_I_MASS, pressure_i, *voids, is_solid
+    )
+    fill_flux_j = make_flux(
+        energy, scratch.AREA_X_J, scratch.FLUX_J_MASS, pressure_j, *voids, is_solid
+    )
     use_hll_i = make_hll_flux(
         energy,
         i_faces,
-        scratch.HLL_BEFORE,
-        scratch.VOIDED_ENERGY_BEFORE,
+        (scratch.HLL_BEFORE, scratch.VOIDED_ENERGY_BEFORE),
         scratch.FLUX_I_MASS,
         pressure_i,
         *voids,
+        force_i,
     )
     use_hll_j = make_hll_flux(
         energy,
         j_faces,
-        scratch.HLL - 1,
-        scratch.VOIDED_ENERGY - 1,
+        (scratch.HLL - 1, scratch.VOIDED_ENERGY - 1),
         scratch.FLUX_J_MASS,
         pressure_j,
         *voids,
+        force_j,
+    )
+    # solids alone
+    add_shear_flux_i = make_shear_flux(
+        i_faces,
+        (scratch.X_LOW, scratch.X_LOW + 1),
+        (scratch.SHEAR_BEFORE, scratch.SHEAR),
+        scratch.FORCE_I_X,
+        scratch.FLUX_I_MASS,
+        scratch.SPEED_I_X,
+        geometry,
+    )
+    add_shear_flux_j = make_shear_flux(
+        j_faces,
+        (scratch.X_HIGH, scratch.X_LOW),
+        (scratch.SHEAR - 1, scratch.SHEAR),
+        scratch.FORCE_J_X,
+        scratch.FLUX_J_MASS,
+        scratch.SPEED_J_X,
+        geometry,
     )
     # axisymmetric flow alone
     fill_source_pressure = make_source_pressure(sound)
@@ -143,9 +173,17 @@ def make_flow_kernels(
     )
 
     @compiled_once(allocates=False)
+    def load_stress(solid, row, start, count, Z):
+        """What the cells of a row have of their stress."""
+        copy_row(solid.shear, row, start, count, Z, scratch.SHEAR + 1)
+        copy_rows(solid.pull, row, start, count, Z, scratch.STRESS_X + 1)
+        if curved:
+            copy_rows(solid.hoop, row, start, count, Z, scratch.STRESS_SPREAD + 1)
+
+    @compiled_once(allocates=False)
     def advance_tile(old, new, rim, dt, parameters, tile, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
-        state, void_energy, nodes = old
+        state, void_energy, nodes = old[:3]
         state_new, void_energy_new, nodes_new, rates_new, crowding_new, mass_i, mass_j = new
         keeps_masses = mass_i.shape[0] > 1
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
@@ -219,6 +257,8 @@ def make_flow_kernels(
                         clear_shift_after(Z, padded)
                 if opens_voids:
                     copy_row(void_energy, row, first_column, cells, Z, scratch.VOID_LOADED + 1)
+                if is_solid:
+                    load_stress(old[3], row, first_column, cells, Z)
                 # prefetch what the next row reads and where this one's results are written
                 prefetch_rows(state, min(row + 3, ni + 1), first_column, cells + 2)
                 prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
@@ -256,6 +296,8 @@ def make_flow_kernels(
                         scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1,
                     )
             elif row >= first_row:
+                if is_solid:
+                    copy_rows(old[3].force_i, row, first_column, cells, Z, scratch.FORCE_I_X + 1)
                 fill_upwind_i(Z, whole)
                 fill_flux_i(Z, whole, parameters)
                 first_face = min(first_hll_cell, first_hll_before)
@@ -264,6 +306,16 @@ def make_flow_kernels(
                     use_hll_i(Z, first_face, last_face, parameters)
                 if curved:
                     fill_push_i(Z, padded)
+                if is_solid:
+                    add_shear_flux_i(Z, padded)
+                    copy_rows_back(
+                        Z,
+                        scratch.SPEED_I_X + first_entry,
+                        stop_j - first_j,
+                        old[3].speed_i,
+                        row,
+                        first_j,
+                    )
             if keeps_masses and row >= first_row:
                 copy_back(
                     Z, scratch.FLUX_I_MASS + first_entry, stop_j - first_j, mass_i, row, first_j
@@ -274,12 +326,26 @@ def make_flow_kernels(
                 fill_faces_j(Z, padded, inverse_dt)
                 fill_traces(Z, whole, counted, parameters)
             if inside:
+                if is_solid:
+                    copy_rows(
+                        old[3].force_j, row, first_column, cells + 1, Z, scratch.FORCE_J_X + 1
+                    )
                 fill_upwind_j(Z, whole)
                 fill_flux_j(Z, whole, parameters)
                 if first_hll_cell <= last_hll_cell:
                     use_hll_j(Z, first_hll_cell, last_hll_cell + 1, parameters)
                 if curved:
                     fill_push_j(Z, padded)
+                if is_solid:
+                    add_shear_flux_j(Z, padded)
+                    copy_rows_back(
+                        Z,
+                        scratch.SPEED_J_X + first_entry,
+                        stop_j - first_j + 1,
+                        old[3].speed_j,
+                        row,
+                        first_j,
+                    )
                 if first_j == 0:
                     for q in range(FLUX_ROWS):
                         Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + first_entry] = -rim[
@@ -329,6 +395,9 @@ def make_flow_kernels(
                     first_j,
                 )
             next_row(Z, padded)
+            if is_solid:
+                for k in range(SCRATCH_SPAN):
+                    Z[scratch.SHEAR_BEFORE + k] = Z[scratch.SHEAR + k]
             row += 1
         least = 1e300
         for q in range(TOTAL_ROWS):
@@ -351,11 +420,11 @@ def make_flow_kernels(
 
         old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
         nj): energy of cells with voids minus that of intact material at the same density and p = 0;
-        nodes (2, ni + 1, nj + 1).  new: the same three, of which the first two are written, the
-        rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and the rates of mass
-        through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where nobody asks for them.  rim: rows
-        of `hydro.rim` with the fluxes through the sides and the lengths of the ghosts; scratches
-        (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
+        nodes (2, ni + 1, nj + 1); for a solid, its `SolidArrays`.  new: the first three, of which
+        two are written, the rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and
+        the rates of mass through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where nobody asks for
+        them.  rim: rows of `hydro.rim` with the fluxes through the sides and the lengths of the
+        ghosts; scratch (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
             advance_tile(old, new, rim, dt, parameters, tile, scratches[0], tile_totals)

@@ -9,7 +9,9 @@ operations overlap between faces.
 from __future__ import annotations
 
 from shockgrid.hydro.formulas import riemann
+from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
+from shockgrid.hydro.formulas.strength import add_shear_wave, compute_shear_contact
 from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
@@ -48,11 +50,14 @@ def make_faces(compute_face, node_row_a, node_row_b, target_row):
     return fill_faces
 
 
-def make_traces(sound_speed_squared_part, opens_voids):
-    """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j."""
+def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
+    """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j.
+
+    is_solid: c² is that of longitudinal waves.
+    """
 
     @inlined
-    def trace(half, gradients, of_cell, voided_energy, dx, dy, parameters):
+    def trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
         c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_voided`).  The
@@ -64,18 +69,23 @@ def make_traces(sound_speed_squared_part, opens_voids):
         if opens_voids:
             c2 = choose_own(c2, c2_of_cell, voided_energy)
         is_state = (rho > 0.0) & (c2 > 0.0)
+        rho = rho if is_state else rho_of_cell
+        c2 = c2 if is_state else c2_of_cell
+        if is_solid:
+            c2 = add_shear_wave(c2, shear, rho)
         return (
-            rho if is_state else rho_of_cell,
+            rho,
             u if is_state else u_of_cell,
             v if is_state else v_of_cell,
             p if is_state else p_of_cell,
-            c2 if is_state else c2_of_cell,
+            c2,
             0.0 if is_state else 1.0,
         )
 
     @inlined
     def load(Z, k):
-        """What is traced: predicted state, gradients, own state and c², whether torn, centre."""
+        """What is traced: predicted state, gradients, own state and c², whether torn, shear
+        modulus, centre."""
         return (
             (
                 Z[scratch.RHO_HALF + k],
@@ -101,6 +111,7 @@ def make_traces(sound_speed_squared_part, opens_voids):
                 Z[scratch.C2 + k],
             ),
             Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK,
+            Z[scratch.SHEAR + k] if is_solid else 0.0,
             Z[scratch.X_CENTRE + k],
             Z[scratch.Y_CENTRE + k],
         )
@@ -116,38 +127,51 @@ def make_traces(sound_speed_squared_part, opens_voids):
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, shear, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
-            fell_back = put(
-                Z, scratch.IN, k, trace(half, gradients, of_cell, voided_energy, dx, dy, parameters)
-            )
+            inwards = trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters)
+            fell_back = put(Z, scratch.IN, k, inwards)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     @compiled_once(allocates=False)
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, shear, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
             down_dx, down_dy = Z[scratch.X_J + k] - x, Z[scratch.Y_J + k] - y
             up_dx, up_dy = Z[scratch.X_J + k + 1] - x, Z[scratch.Y_J + k + 1] - y
-            out = trace(half, gradients, of_cell, voided_energy, dx, dy, parameters)
+            out = trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters)
             fell_back = put(Z, scratch.OUT, k, out)
-            down = trace(half, gradients, of_cell, voided_energy, down_dx, down_dy, parameters)
+            down = trace(
+                half, gradients, of_cell, voided_energy, shear, down_dx, down_dy, parameters
+            )
             fell_back += put(Z, scratch.DOWN, k, down)
-            up = trace(half, gradients, of_cell, voided_energy, up_dx, up_dy, parameters)
+            up = trace(half, gradients, of_cell, voided_energy, shear, up_dx, up_dy, parameters)
             fell_back += put(Z, scratch.UP, k, up)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     return fill_traces_in, fill_traces
 
 
-def make_upwind(left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids):
+@inlined
+def compute_stress_on(Z, force, face, k):
+    """s_nn of a face [Pa], from the rows of the force there and of its normal times area."""
+    area_x = Z[face + k]
+    area_y = Z[face + SCRATCH_SPAN + k]
+    work = Z[force + k] * area_x + Z[force + SCRATCH_SPAN + k] * area_y
+    return work / (area_x * area_x + area_y * area_y)
+
+
+def make_upwind(
+    left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids, force=0
+):
     """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the torn
     energies and acoustic weights of the cells on the left.  `low_mach`: the limiter has acoustic
-    weights; `opens_voids`: the material has void energies.
+    weights; `opens_voids`: the material has void energies; `force`: of a solid, the row of forces
+    of its stress on the faces.
     """
 
     @compiled_once(allocates=False)
@@ -181,10 +205,17 @@ def make_upwind(left_row, right_row, face_row, voided_row, acoustic_row, low_mac
                 Z[right_row + 4 * SCRATCH_SPAN + k],
                 square,
             )
+            left_stress = 0.0
+            right_stress = 0.0
+            if force:
+                left_stress = compute_stress_on(Z, force, face_row, k)
+                right_stress = compute_stress_on(Z, force + 2 * SCRATCH_SPAN, face_row, k)
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
-                (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
+                (rho_l, p_l - left_stress, w_l, s_l), (rho_r, p_r - right_stress, w_r, s_r), square
             )
             from_left = push <= 0.0
+            if force:
+                Z[scratch.STRESS_SIDE + k] = left_stress if from_left else right_stress
             s_l_cut = s_l if s_l < 0.0 else 0.0
             s_r_cut = s_r if s_r > 0.0 else 0.0
             Z[scratch.RHO_SIDE + k] = rho_l if from_left else rho_r
@@ -227,12 +258,21 @@ def find_hll(Z, m):
     return first, last
 
 
-def make_flux(energy_part, face_row, flux_row, pressure_row, opens_voids, find_leaving_part=None):
+def make_flux(
+    energy_part,
+    face_row,
+    flux_row,
+    pressure_row,
+    opens_voids,
+    find_leaving_part=None,
+    is_solid=False,
+):
     """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face_row`: the faces' normals; `flux_row`: mass flux (momentum, energy
     follow); `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`:
-    of `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have.
+    of `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have; `is_solid`: the
+    stress acts as a part of the pressure.
     """
     withholds = find_leaving_part is not None
 
@@ -259,6 +299,8 @@ def make_flux(energy_part, face_row, flux_row, pressure_row, opens_voids, find_l
             )
             u = Z[scratch.U_SIDE + k]
             v = Z[scratch.V_SIDE + k]
+            if is_solid:
+                p = p - Z[scratch.STRESS_SIDE + k]
             # its flux plus its wave's (theory F3.9), of gases held back in part (F4.12)
             flux = riemann.compute_star_flux(
                 (rho, u, v, p, e),
@@ -284,23 +326,17 @@ def make_flux(energy_part, face_row, flux_row, pressure_row, opens_voids, find_l
 
 
 def make_hll_flux(
-    energy_part,
-    faces,
-    switch_row,
-    voided_row,
-    flux_row,
-    pressure_row,
-    opens_voids,
-    find_leaving_part=None,
+    energy_part, faces, marks, flux_row, pressure_row, opens_voids, find_leaving_part=None, force=0
 ):
     """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
-    of the faces; `switch_row`: the HLL
-    switch of the cells on the left; `voided_row`: their energies where they are torn.
+    of the faces; `marks`: the HLL switch of the cells on the left and their energies where they are
+    torn; `force`: as in `make_upwind`.
     """
 
     left_row, right_row, face_row = faces
+    switch_row, voided_row = marks
     withholds = find_leaving_part is not None
 
     @compiled_once(allocates=False)
@@ -323,6 +359,9 @@ def make_hll_flux(
             u_r, v_r = Z[right_row + SCRATCH_SPAN + k], Z[right_row + 2 * SCRATCH_SPAN + k]
             c2_l = Z[left_row + 4 * SCRATCH_SPAN + k]
             c2_r = Z[right_row + 4 * SCRATCH_SPAN + k]
+            if force:
+                p_l = p_l - compute_stress_on(Z, force, face_row, k)
+                p_r = p_r - compute_stress_on(Z, force + 2 * SCRATCH_SPAN, face_row, k)
             # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
@@ -356,3 +395,61 @@ def make_hll_flux(
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure
 
     return use_hll
+
+
+def make_shear_flux(faces, nodes, shears, force, flux, speed, geometry: Geometry):
+    """Phase that adds the shear stress on a row of faces to the fluxes through them.
+
+    Scratch offsets: `faces`: the traced densities on both sides and the normals of the faces;
+    `nodes`: of x of the nodes at a face's ends, as in `make_faces`; `shears`: of the shear moduli
+    on both sides; `force`: as in `make_upwind`; `flux`: of the mass flux, PUSH and HOOP being the
+    fifth and sixth row; `speed`: where the velocity of the contacts is kept (two rows).
+    """
+    left, right, face = faces
+    shear_l, shear_r = shears
+    node_a, node_b = nodes
+    curved = geometry.curved
+
+    @compiled_once(allocates=False)
+    def add_shear_flux(Z, n):
+        """Both sides of a face stick together (theory F20.6); where neither has a shear modulus
+        there is no stress."""
+        for k in range(1, n + 1):
+            area_x = Z[face + k]
+            area_y = Z[face + SCRATCH_SPAN + k]
+            square = area_x * area_x + area_y * area_y
+            inverse = 1.0 / square
+            area = square**0.5
+            # along the face (-area_y, area_x): speeds times its area, stresses on it
+            speed_l = Z[left + 2 * SCRATCH_SPAN + k] * area_x
+            speed_l -= Z[left + SCRATCH_SPAN + k] * area_y
+            speed_r = Z[right + 2 * SCRATCH_SPAN + k] * area_x
+            speed_r -= Z[right + SCRATCH_SPAN + k] * area_y
+            stress_l = Z[force + SCRATCH_SPAN + k] * area_x - Z[force + k] * area_y
+            stress_r = Z[force + 3 * SCRATCH_SPAN + k] * area_x
+            stress_r -= Z[force + 2 * SCRATCH_SPAN + k] * area_y
+            stress, speed_along = compute_shear_contact(
+                ((Z[left + k] * Z[shear_l + k]) ** 0.5, speed_l, stress_l * inverse * area),
+                ((Z[right + k] * Z[shear_r + k]) ** 0.5, speed_r, stress_r * inverse * area),
+            )
+            # stress is that on the face times its area: force along it, and its work
+            pull = stress / area
+            Z[flux + SCRATCH_SPAN + k] += pull * area_y
+            Z[flux + 3 * SCRATCH_SPAN + k] -= pull * speed_along
+            if curved:
+                plane_area_x = 0.5 * (
+                    (Z[node_b + SCRATCH_SPAN + k] - Z[node_a + SCRATCH_SPAN + k])
+                    + (Z[node_b + 3 * SCRATCH_SPAN + k] - Z[node_a + 3 * SCRATCH_SPAN + k])
+                )
+                Z[flux + 4 * SCRATCH_SPAN + k] -= pull * plane_area_x
+                Z[flux + 5 * SCRATCH_SPAN + k] -= pull * area_x
+            else:
+                Z[flux + 2 * SCRATCH_SPAN + k] -= pull * area_x
+            # velocity of the contact: across the face as fast as the contact in HLLC
+            speed_across = (
+                Z[scratch.PUSH + k] / Z[scratch.DRAG + k] + Z[face + 2 * SCRATCH_SPAN + k]
+            )
+            Z[speed + k] = (speed_across * area_x - speed_along * area_y) * inverse
+            Z[speed + SCRATCH_SPAN + k] = (speed_across * area_y + speed_along * area_x) * inverse
+
+    return add_shear_flux

@@ -137,13 +137,18 @@ class RowPhases(NamedTuple):
 
 
 @functools.cache
-def make_row_phases(eos_class, limiter: str, geometry: Geometry, flux: str) -> RowPhases:
-    """Phases of an equation of state, a limiter, a geometry and a flux."""
+def make_row_phases(
+    eos_class, limiter: str, geometry: Geometry, flux: str, is_solid: bool = False
+) -> RowPhases:
+    """Phases of an equation of state, a limiter, a geometry and a flux; is_solid: with stress.
+
+    A solid has elastic waves that run ahead of plastic ones, as in a material with kinks.
+    """
     sound = eos_class.sound_speed_squared_part
     curved = geometry.curved
     switch = sound, eos_class.energy_part, HLL_JUMP_THRESHOLDS[flux], eos_class.opens_voids
-    limit = choose_limit(limiter, eos_class.has_kinks)
-    fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch)
+    limit = choose_limit(limiter, eos_class.has_kinks or is_solid)
+    fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch, is_solid)
     fill_geometry = make_geometry(geometry.volume)
     fill_switch = make_switch(*switch)
 

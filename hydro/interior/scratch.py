@@ -96,6 +96,16 @@ RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
 LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY = _rows(6)
 SUM_VOIDED, SUM_EMPTIED = _rows(2)
+# solids alone: shear modulus of this row's cells and the row before's, force of the deviatoric
+# stress per volume; axisymmetric: s_rr - s_tt and s_tt in the middle of a cell at mid-time
+SHEAR, SHEAR_BEFORE, STRESS_X, STRESS_Y, STRESS_SPREAD, STRESS_HOOP = _rows(6)
+# forces of the deviatoric stress on faces towards -i and -j, traced from the cells before and after
+FORCE_I = FORCE_I_X, FORCE_I_Y, FORCE_I_X_AFTER, FORCE_I_Y_AFTER = _rows(4)
+FORCE_J = FORCE_J_X, FORCE_J_Y, FORCE_J_X_AFTER, FORCE_J_Y_AFTER = _rows(4)
+# part of the pressure that is the stress on the upwind side's face; velocity of faces' contacts
+STRESS_SIDE = next(_next)
+SPEED_I_X, SPEED_I_Y = _rows(2)
+SPEED_J_X, SPEED_J_Y = _rows(2)
 
 SIZE = next(_next) + 1
 
@@ -255,6 +265,13 @@ def shift_rows(Z, n):
         Z[P + k] = Z[P_AFTER + k]
         Z[LENGTH_BEFORE + k] = Z[LENGTH + k]
         Z[LENGTH + k] = Z[LENGTH_AFTER + k]
+
+
+@compiled_once(allocates=False)
+def copy_rows_back(Z, offset, count, target, row, start):
+    """`copy_rows` in the other direction."""
+    for q in range(target.shape[0]):
+        copy_back(Z, offset + q * SCRATCH_SPAN, count, target[q], row, start)
 
 
 def prefetch(array, row, column):

@@ -66,7 +66,7 @@ def make_difference_weights(geometry):
     return compute_difference_weights
 
 
-def make_slopes(limit, relaxed, geometry, switch):
+def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
     """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
 
     Plane: what the cells are on the old grid, c², the energy and the HLL switch come from the same
@@ -75,7 +75,7 @@ def make_slopes(limit, relaxed, geometry, switch):
 
     With `relaxed`, where the flow turns and neither compresses nor jumps, the velocity's slopes
     are the plain means of both differences (`compute_acoustic_weight`): a limiter would take every
-    crest of the speed for a shock.
+    crest of the speed for a shock.  With `is_solid` the deviatoric stress acts on the velocity.
     """
     limit_velocity = make_limit_velocity(limit)
     curved = geometry.curved
@@ -218,6 +218,9 @@ def make_slopes(limit, relaxed, geometry, switch):
                 (rho, u, v, p), c2, (advecting_u, advecting_v),
                 (rho_x, rho_y, u_x, u_y, v_x, v_y, p_x, p_y), half_dt,
             )  # fmt: skip
+            if is_solid:
+                u_half = u_half + half_dt * Z[scratch.STRESS_X + k] / rho
+                v_half = v_half + half_dt * Z[scratch.STRESS_Y + k] / rho
             if curved:
                 rho_half, p_half = thin_half_step(rho_half, p_half, rho, v, c2, y, half_dt)
             # kept for the traces

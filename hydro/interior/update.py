@@ -11,6 +11,7 @@ from shockgrid.hydro.eos.base import make_leaving_part
 from shockgrid.hydro.eos.conversion import make_conversion
 from shockgrid.hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
+from shockgrid.hydro.formulas.strength import add_shear_wave
 from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.rows import LEAST_C2
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
@@ -29,12 +30,13 @@ def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     return (convection + sound) * inverse, (square_i + square_j) * (inverse * inverse)
 
 
-def make_update(eos_class, geometry, finishes, gathers):
+def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
     """Phase that updates rows, of an equation of state class and a `Geometry`.
 
     `finishes`: it turns the waiting conserved quantities of the row before into its new state;
     `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
     Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
+    `is_solid`: rates are those of longitudinal waves; in axisymmetric flow the hoop stress acts.
     """
     to_pressure = make_conversion(eos_class).to_pressure
     opens_voids = eos_class.opens_voids
@@ -99,10 +101,13 @@ def make_update(eos_class, geometry, finishes, gathers):
                 inverse_area = inverse_volume
                 if curved:
                     inverse_area = 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
+                wave_c2 = c2
+                if is_solid:
+                    wave_c2 = add_shear_wave(c2, Z[scratch.SHEAR_BEFORE + k], rho)
                 Z[scratch.RATE_NEW + k], Z[scratch.CROWDING_NEW + k] = compute_rate(
                     u - Z[scratch.W_X + k] * inverse_dt,
                     v - Z[scratch.W_Y + k] * inverse_dt,
-                    c2,
+                    wave_c2,
                     mid_i_x,
                     mid_i_y,
                     mid_j_x,
@@ -170,6 +175,10 @@ def make_update(eos_class, geometry, finishes, gathers):
                         (Z[scratch.MJ_X + k], Z[scratch.MJ_Y + k]),
                     )
                     push = dt * share * Z[scratch.SOURCE_P + k]
+                    if is_solid:
+                        # the same of the stress: all of it per radian, the spread per depth
+                        hoop = (1.0 - share) * Z[scratch.STRESS_SPREAD + k]
+                        push = push + dt * (hoop - share * Z[scratch.STRESS_HOOP + k])
                     momentum_y = stretch_ring(momentum_y, push, lines, (mid_i, mid_j))
                     Z[scratch.LEVER + k] = lever
                     Z[scratch.SHARE + k] = share

@@ -173,14 +173,16 @@ def make_side_kernels(
     limiter: str = DEFAULT_LIMITER,
     geometry: Geometry = PLANE,
     flux: str = DEFAULT_FLUX,
+    is_solid: bool = False,
 ) -> SideKernels:
-    """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux."""
+    """Side kernels for an `EquationOfState` class, a limiter, a geometry and a flux; is_solid: as
+    of `hydro.interior.advance`."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
     low_mach = limiter in LOW_MACH
-    rows = make_row_phases(eos_class, limiter, geometry, flux)
+    rows = make_row_phases(eos_class, limiter, geometry, flux, is_solid)
     measure_after = rows.measure_after
     next_row = rows.next_row
     reconstruct = rows.reconstruct
@@ -260,7 +262,7 @@ def make_side_kernels(
     @compiled_once(allocates=False)
     def predict(old, half_dt, parameters, Z, rim):
         """State at mid-time at the cells' centres, gradients, switches; ghosts must be known."""
-        state, void_energy, nodes = old
+        state, void_energy, nodes = old[:3]
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
@@ -288,6 +290,11 @@ def make_side_kernels(
                         Z[scratch.VOID_LOADED + 1 + k] = void_energy[
                             find_strip_cell(strip, 0, start + k)
                         ]
+                if is_solid:
+                    for k in range(m):
+                        i, j = find_strip_cell(strip, 0, start + k)
+                        Z[scratch.STRESS_X + 1 + k] = old[3].pull[0, i, j]
+                        Z[scratch.STRESS_Y + 1 + k] = old[3].pull[1, i, j]
                 low = rim[LENGTH_GHOST, before] if start == 0 else -1.0
                 high = rim[LENGTH_GHOST, after] if start + m == along else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)

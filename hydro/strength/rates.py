@@ -1,0 +1,348 @@
+"""Rates of strain and rotation of cells, and the stress that they make.
+
+At the start of a step they follow from the limited slopes of the velocity, after it from the
+velocities of the contacts at the faces, which the flow's update has found.  Of each cell are kept
+the deviator of the rate of strain, the rate of rotation and the equivalent rate.  Theory F20.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from shockgrid.hydro.carried.transport import (
+    LENGTH_I,
+    LENGTH_J,
+    find_value,
+    make_difference_weights,
+)
+from shockgrid.hydro.eos.conversion import has_voids
+from shockgrid.hydro.formulas.geometry import Geometry, lean_lines
+from shockgrid.hydro.formulas.reconstruction import (
+    compute_gradient,
+    compute_line_geometry,
+    limit_gently,
+    make_limit_velocity,
+)
+from shockgrid.hydro.formulas.strength import (
+    compute_force,
+    compute_hoop_stress,
+    return_to_yield,
+    turn_stress,
+)
+from shockgrid.hydro.interior.scratch import find_twist
+from shockgrid.hydro.perimeter.faces import find_corners
+from shockgrid.hydro.rim import find_first_face
+from shockgrid.hydro.rows import U, V
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN
+
+# rows of `rates` (5, ni, nj): deviator of the rate of strain, rate of rotation, equivalent rate
+RATE_XX, RATE_YY, RATE_XY, SPIN, EQUIVALENT = range(5)
+RATE_ROWS = 5
+# carried fields of a solid, in their order
+S_XX, S_YY, S_XY, PLASTIC_STRAIN = range(4)
+# parts of `slopes` of a field, of `hydro.carried.transport`
+AT_CENTRE, SLOPE_X, SLOPE_Y = range(3)
+
+
+@inlined
+def keep_rates(rates, i, j, gradient, hoop):
+    """Store the rates of a cell: gradient (u_x, u_y, v_x, v_y) and rate of the hoops [1/s]."""
+    u_x, u_y, v_x, v_y = gradient
+    third = ((u_x + v_y) + hoop) / 3.0
+    rate_xx = u_x - third
+    rate_yy = v_y - third
+    rate_xy = 0.5 * (u_y + v_x)
+    rates[RATE_XX, i, j] = rate_xx
+    rates[RATE_YY, i, j] = rate_yy
+    rates[RATE_XY, i, j] = rate_xy
+    rates[SPIN, i, j] = 0.5 * (v_x - u_y)
+    square = (rate_xx * rate_xx + rate_yy * rate_yy) + (rate_xx * rate_yy + rate_xy * rate_xy)
+    rates[EQUIVALENT, i, j] = (4.0 / 3.0 * square) ** 0.5
+
+
+@inlined
+def is_read(i, j, ni, nj, rows):
+    """Does a step that updates these rows of cells read what is predicted in a cell?"""
+    first, last = rows
+    near = first - 1 <= i < last + 1 and last > first
+    return near or i == 0 or i == ni - 1 or j == 0 or j == nj - 1
+
+
+@functools.cache
+def make_predict_rates(geometry: Geometry):
+    """Kernel that fills the rates at the start of a step, of a geometry."""
+    curved = geometry.curved
+    weigh = make_difference_weights(geometry)
+    limit_velocity = make_limit_velocity(limit_gently)
+
+    @inlined
+    def limit_along(state, measures, length, here, before, after, line):
+        """Limited variation of the velocity along a line through three cells (i, j)."""
+        first, second = weigh(measures, length, here, before, after)
+        u = state[U, here[0], here[1]]
+        v = state[V, here[0], here[1]]
+        return limit_velocity(
+            (u - state[U, before[0], before[1]]) * first,
+            (v - state[V, before[0], before[1]]) * first,
+            (state[U, after[0], after[1]] - u) * second,
+            (state[V, after[0], after[1]] - v) * second,
+            line[0],
+            line[1],
+            1.0 / (line[0] * line[0] + line[1] * line[1]),
+        )
+
+    @compiled_once(allocates=False)
+    def fill_rates(state, nodes, i, j, measures, centres, rates):
+        a, b, c, d = find_corners(nodes, i, j)
+        mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+        line_i, line_j = mid_i, mid_j
+        inverse = 1.0 / area
+        if curved:
+            twist, y = find_twist(a, b, c, d)
+            line_i, line_j = lean_lines(mid_i, mid_j, twist, y)
+            inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
+        here = i + 1, j + 1
+        u_i, v_i = limit_along(state, measures, LENGTH_I, here, (i, j + 1), (i + 2, j + 1), mid_i)
+        u_j, v_j = limit_along(state, measures, LENGTH_J, here, (i + 1, j), (i + 1, j + 2), mid_j)
+        u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
+        v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
+        hoop = state[V, i + 1, j + 1] / centres[1, i, j] if curved else 0.0
+        keep_rates(rates, i, j, (u_x, u_y, v_x, v_y), hoop)
+
+    @kernel(allocates=False)
+    def predict_rates(state, nodes, measures, centres, rows, rates):
+        """Rates (5, ni, nj) from a state with ghosts; measures, centres: of `Transport`."""
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        for i in range(ni):
+            for j in range(nj):
+                if is_read(i, j, ni, nj, rows):
+                    fill_rates(state, nodes, i, j, measures, centres, rates)
+
+    return predict_rates
+
+
+@functools.cache
+def make_measure_rates(geometry: Geometry):
+    """Kernel that fills the rates over a step from the velocities of the faces, of a geometry."""
+    curved = geometry.curved
+    weigh_volume = geometry.volume
+    compute_face = geometry.face
+
+    @inlined
+    def find_middle(nodes, nodes_new, i, j):
+        """A node at mid-time."""
+        return (
+            0.5 * (nodes[0, i, j] + nodes_new[0, i, j]),
+            0.5 * (nodes[1, i, j] + nodes_new[1, i, j]),
+        )
+
+    @inlined
+    def choose_speed(inside, i, j, sides, face, at_side):
+        """Velocity of a face: of the arrays inside, or of the sides."""
+        if at_side:
+            return sides[0, face], sides[1, face]
+        return inside[0, i, j], inside[1, i, j]
+
+    @inlined
+    def multiply(speed, area_x, area_y):
+        """u A_x, u A_y, v A_x, v A_y."""
+        u, v = speed
+        return u * area_x, u * area_y, v * area_x, v * area_y
+
+    @inlined
+    def sweep(speed, nodes, nodes_new, start, end):
+        """Volume per time that a face, from one node to another, sweeps with the material."""
+        a = nodes[0, start[0], start[1]], nodes[1, start[0], start[1]]
+        b = nodes[0, end[0], end[1]], nodes[1, end[0], end[1]]
+        a_new = nodes_new[0, start[0], start[1]], nodes_new[1, start[0], start[1]]
+        b_new = nodes_new[0, end[0], end[1]], nodes_new[1, end[0], end[1]]
+        area_x, area_y, _, _, _ = compute_face(a, b, a_new, b_new, 1.0)
+        return speed[0] * area_x + speed[1] * area_y
+
+    @kernel(allocates=False)
+    def measure_rates(nodes, nodes_new, speed_i, speed_j, sides, rows, rates):
+        """Rates (5, ni, nj) of the rows first..last - 1 of cells.
+
+        speed_i, speed_j: of `SolidArrays`; sides (2, faces): velocities at the sides' faces.
+        """
+        ni = nodes.shape[1] - 1
+        nj = nodes.shape[2] - 1
+        first_low = find_first_face(I_MIN, ni, nj)
+        first_high = find_first_face(I_MAX, ni, nj)
+        first_below = find_first_face(J_MIN, ni, nj)
+        first_above = find_first_face(J_MAX, ni, nj)
+        for i in range(rows[0], rows[1]):
+            for j in range(nj):
+                # the cell at mid-time and the velocities of its faces
+                a = find_middle(nodes, nodes_new, i, j)
+                b = find_middle(nodes, nodes_new, i + 1, j)
+                c = find_middle(nodes, nodes_new, i + 1, j + 1)
+                d = find_middle(nodes, nodes_new, i, j + 1)
+                low = choose_speed(speed_i, i, j, sides, first_low + j, i == 0)
+                high = choose_speed(speed_i, i + 1, j, sides, first_high + j, i == ni - 1)
+                below = choose_speed(speed_j, i, j, sides, first_below + i, j == 0)
+                above = choose_speed(speed_j, i, j + 1, sides, first_above + i, j == nj - 1)
+                # the velocity times the outward normals, summed
+                out_low = multiply(low, a[1] - d[1], d[0] - a[0])
+                out_high = multiply(high, c[1] - b[1], b[0] - c[0])
+                out_below = multiply(below, b[1] - a[1], a[0] - b[0])
+                out_above = multiply(above, d[1] - c[1], c[0] - d[0])
+                mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
+                inverse = 1.0 / area
+                u_x = inverse * ((out_low[0] + out_high[0]) + (out_below[0] + out_above[0]))
+                u_y = inverse * ((out_low[1] + out_high[1]) + (out_below[1] + out_above[1]))
+                v_x = inverse * ((out_low[2] + out_high[2]) + (out_below[2] + out_above[2]))
+                v_y = inverse * ((out_low[3] + out_high[3]) + (out_below[3] + out_above[3]))
+                hoop = 0.0
+                if curved:
+                    # rings grow as the volume does and the area does not (theory F20.8)
+                    twist, y = find_twist(a, b, c, d)
+                    volume = weigh_volume(area, mid_i, mid_j, twist, y)
+                    gain_i = sweep(high, nodes, nodes_new, (i + 1, j), (i + 1, j + 1))
+                    gain_i -= sweep(low, nodes, nodes_new, (i, j), (i, j + 1))
+                    gain_j = sweep(above, nodes, nodes_new, (i + 1, j + 1), (i, j + 1))
+                    gain_j -= sweep(below, nodes, nodes_new, (i + 1, j), (i, j))
+                    hoop = (gain_i + gain_j) / volume - (u_x + v_y)
+                keep_rates(rates, i, j, (u_x, u_y, v_x, v_y), hoop)
+
+    return measure_rates
+
+
+@inlined
+def strain_stress(s, rates, i, j, shear, flow_stress, hardening, dt):
+    """A cell's stress (s_xx, s_yy, s_xy) turned, strained and returned; then the plastic strain."""
+    s_xx, s_yy, s_xy = turn_stress(s[0], s[1], s[2], 0.5 * dt * rates[SPIN, i, j])
+    more = 2.0 * dt * shear
+    s_xx += more * rates[RATE_XX, i, j]
+    s_yy += more * rates[RATE_YY, i, j]
+    s_xy += more * rates[RATE_XY, i, j]
+    return return_to_yield(s_xx, s_yy, s_xy, shear, flow_stress, hardening)
+
+
+@functools.cache
+def make_predict_stress(geometry: Geometry):
+    """Kernel that predicts the stress at mid-time and finds its force, of a geometry."""
+    curved = geometry.curved
+
+    @kernel(allocates=False)
+    def predict_stress(values, slopes, rates, laws, half_dt, centres, rows, arrays):
+        """Stress at mid-time into `slopes`, with its divergence.
+
+        values (n, ni + 2, nj + 2), slopes (n, 3, ni, nj): of the carried fields of a solid, from
+        s_xx on; laws: flow stress and hardening (ni, nj) [Pa]; centres (2, ni, nj); arrays:
+        `SolidArrays`, of which shear is known and pull and hoop are filled.
+        """
+        flow_stress, hardening = laws
+        shear = arrays.shear
+        ni, nj = shear.shape
+        for i in range(ni):
+            for j in range(nj):
+                if not is_read(i, j, ni, nj, rows):
+                    continue
+                s_xx = values[S_XX, i + 1, j + 1]
+                s_yy = values[S_YY, i + 1, j + 1]
+                s_xy = values[S_XY, i + 1, j + 1]
+                if shear[i, j] > 0.0:
+                    new_xx, new_yy, new_xy, _ = strain_stress(
+                        (s_xx, s_yy, s_xy), rates, i, j, shear[i, j], flow_stress[i, j],
+                        hardening[i, j], half_dt,
+                    )  # fmt: skip
+                    slopes[S_XX, AT_CENTRE, i, j] += new_xx - s_xx
+                    slopes[S_YY, AT_CENTRE, i, j] += new_yy - s_yy
+                    slopes[S_XY, AT_CENTRE, i, j] += new_xy - s_xy
+                else:
+                    # nothing that fluids and pieces bear
+                    for q in range(S_XX, S_XY + 1):
+                        for part in range(slopes.shape[1]):
+                            slopes[q, part, i, j] = 0.0
+                pull_x = slopes[S_XX, SLOPE_X, i, j] + slopes[S_XY, SLOPE_Y, i, j]
+                pull_y = slopes[S_XY, SLOPE_X, i, j] + slopes[S_YY, SLOPE_Y, i, j]
+                if curved:
+                    y = centres[1, i, j]
+                    pull_x += s_xy / y
+                    pull_y += (s_yy - compute_hoop_stress(s_xx, s_yy)) / y
+                    mid_xx = slopes[S_XX, AT_CENTRE, i, j]
+                    mid_yy = slopes[S_YY, AT_CENTRE, i, j]
+                    hoop = compute_hoop_stress(mid_xx, mid_yy)
+                    arrays.hoop[0, i, j] = mid_yy - hoop
+                    arrays.hoop[1, i, j] = hoop
+                arrays.pull[0, i, j] = pull_x
+                arrays.pull[1, i, j] = pull_y
+
+    return predict_stress
+
+
+@functools.cache
+def make_fill_forces(geometry: Geometry):
+    """Kernel that fills the forces of the stress on the faces inside a block, of a geometry."""
+    compute_face = geometry.face
+
+    @inlined
+    def fill_force(slopes, centres, cell, face, forces, first, place):
+        """Force of a cell's stress on a face, into the rows first, first + 1 of `forces`."""
+        i, j = cell
+        area_x, area_y, _, x, y = face
+        force_x, force_y = compute_force(
+            find_value(slopes[S_XX], centres, i, j, x, y),
+            find_value(slopes[S_YY], centres, i, j, x, y),
+            find_value(slopes[S_XY], centres, i, j, x, y),
+            area_x,
+            area_y,
+        )
+        forces[first, place[0], place[1]] = force_x
+        forces[first + 1, place[0], place[1]] = force_y
+
+    @inlined
+    def find_face(nodes, nodes_new, i, j, i_end, j_end):
+        a = nodes[0, i, j], nodes[1, i, j]
+        b = nodes[0, i_end, j_end], nodes[1, i_end, j_end]
+        a_new = nodes_new[0, i, j], nodes_new[1, i, j]
+        b_new = nodes_new[0, i_end, j_end], nodes_new[1, i_end, j_end]
+        return compute_face(a, b, a_new, b_new, 1.0)
+
+    @kernel(allocates=False)
+    def fill_forces(slopes, centres, nodes, nodes_new, rows, arrays):
+        """force_i, force_j of `arrays` at the faces of the rows first..last - 1 of cells."""
+        ni, nj = arrays.shear.shape
+        first, last = rows
+        for i in range(max(first, 1), min(last + 1, ni)):
+            for j in range(nj):
+                face = find_face(nodes, nodes_new, i, j, i, j + 1)
+                fill_force(slopes, centres, (i - 1, j), face, arrays.force_i, 0, (i, j))
+                fill_force(slopes, centres, (i, j), face, arrays.force_i, 2, (i, j))
+        for i in range(first, last):
+            for j in range(1, nj):
+                face = find_face(nodes, nodes_new, i + 1, j, i, j)
+                fill_force(slopes, centres, (i, j - 1), face, arrays.force_j, 0, (i, j))
+                fill_force(slopes, centres, (i, j), face, arrays.force_j, 2, (i, j))
+
+    return fill_forces
+
+
+@kernel(allocates=False)
+def update_stress(values, rates, laws, shear, held, dt, rows):
+    """New stress and plastic strain after what the mass has brought, in place.
+
+    values (n, ni + 2, nj + 2): carried fields of a solid from s_xx on; laws: flow stress and
+    hardening (ni, nj) [Pa]; shear (ni, nj) [Pa]; held: arrays of HELD_ARRAYS after the step: torn
+    cells bear nothing.
+    """
+    flow_stress, hardening = laws
+    nj = shear.shape[1]
+    for i in range(rows[0], rows[1]):
+        for j in range(nj):
+            old = (
+                values[S_XX, i + 1, j + 1],
+                values[S_YY, i + 1, j + 1],
+                values[S_XY, i + 1, j + 1],
+            )
+            s_xx, s_yy, s_xy, strain = strain_stress(
+                old, rates, i, j, shear[i, j], flow_stress[i, j], hardening[i, j], dt
+            )
+            bears = shear[i, j] > 0.0 and not has_voids(held, i, j)
+            values[S_XX, i + 1, j + 1] = s_xx if bears else 0.0
+            values[S_YY, i + 1, j + 1] = s_yy if bears else 0.0
+            values[S_XY, i + 1, j + 1] = s_xy if bears else 0.0
+            values[PLASTIC_STRAIN, i + 1, j + 1] += strain if bears else 0.0

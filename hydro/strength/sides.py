@@ -1,0 +1,369 @@
+"""Stress along a block's sides: ghosts, what acts on faces beside the pressure, face velocities.
+
+Contacts, walls and free surfaces know a pressure and a sound speed.  For a solid these are minus
+the normal stress, p - s_nn, and the speed of longitudinal waves: written into the rows of the rim
+for states at faces and for traces, they go through all solvers as a fluid's do.  What acts along a
+face is added here.  Theory F20.5, F20.7.
+
+The three components of the stress are the carried fields from number `first` on; along a face
+towards the outside the shear stress is s_nt, with t = (-n_y, n_x) of the outward normal.
+"""
+
+from __future__ import annotations
+
+from shockgrid.hydro.carried.transport import find_value
+from shockgrid.hydro.formulas.reconstruction import limit_gently
+from shockgrid.hydro.formulas.strength import (
+    add_shear_wave,
+    compose_stress,
+    compute_shear_contact,
+    resolve_stress,
+)
+from shockgrid.hydro.interior.slopes import CALM_PRESSURE_JUMP, SHOCK_PRESSURE_JUMP
+from shockgrid.hydro.perimeter.contacts import (
+    AT_CELLS,
+    AT_FLUX,
+    AT_TRACES,
+    carry_fields_through_open_sides,
+    fill_open_fluxes,
+    fill_wall_fluxes,
+    find_normal,
+)
+from shockgrid.hydro.rim import (
+    AREA_X,
+    AREA_Y,
+    C2_TRACE,
+    C_FACE,
+    C_TRACE,
+    CARRIED_CELL,
+    CARRIED_GHOST,
+    CARRIED_TRACE,
+    DISTANCE_NEXT,
+    ENERGY,
+    HOOP,
+    LENGTH,
+    MOMENTUM_X,
+    MOMENTUM_Y,
+    NX,
+    NY,
+    P_FACE,
+    P_GHOST,
+    P_STAR,
+    P_TRACE,
+    PUSH,
+    RHO,
+    RHO_FACE,
+    RHO_GHOST,
+    RHO_TRACE,
+    SWEEP,
+    U_GHOST,
+    U_STAR,
+    U_TRACE,
+    V_GHOST,
+    V_STAR,
+    V_TRACE,
+    W_STAR,
+    X_TRACE,
+    Y_TRACE,
+    C,
+    P,
+    U,
+    V,
+    find_carried_row,
+    find_cell,
+    find_face,
+)
+from shockgrid.hydro.strength.rates import S_XX, S_XY, S_YY
+from shockgrid.regrid.jit import compiled_once, inlined, kernel
+from shockgrid.regrid.sides import find_node
+
+# rows of `sides` (4, faces): velocity of the faces' contacts, as their cells have it; shear stress
+# on the faces, and the speed along them
+SPEED_X, SPEED_Y, SHEAR_STRESS, SPEED_ALONG = range(4)
+SIDE_ROWS = 4
+
+
+@inlined
+def get_stress(rim, first, part, k):
+    """(s_xx, s_yy, s_xy) in the row `part` of carried fields, such as CARRIED_TRACE, of a face."""
+    xx = find_carried_row(first + S_XX) + part
+    yy = find_carried_row(first + S_YY) + part
+    xy = find_carried_row(first + S_XY) + part
+    return rim[xx, k], rim[yy, k], rim[xy, k]
+
+
+@inlined
+def put_stress(rim, first, part, k, stress):
+    """Store what `get_stress` reads."""
+    rim[find_carried_row(first + S_XX) + part, k] = stress[0]
+    rim[find_carried_row(first + S_YY) + part, k] = stress[1]
+    rim[find_carried_row(first + S_XY) + part, k] = stress[2]
+
+
+@compiled_once(allocates=False)
+def extrapolate_stress(values, state, rim, k, shape):
+    """s_nn at a face, with the slope of the next cell inwards where there is no shock (F4.7)."""
+    ni, nj = shape
+    side, along = find_face(k, ni, nj)
+    nx, ny = find_normal(rim, k)
+    i, j = find_node(side, along, 0, ni - 1, nj - 1)
+    i_1, j_1 = find_node(side, along, 1, ni - 1, nj - 1)
+    i_2, j_2 = find_node(side, along, 2, ni - 1, nj - 1)
+    s_0, _, _ = resolve_cell(values, i, j, nx, ny)
+    s_1, _, _ = resolve_cell(values, i_1, j_1, nx, ny)
+    s_2, _, _ = resolve_cell(values, i_2, j_2, nx, ny)
+    p_0 = state[P, i + 1, j + 1]
+    p_1 = state[P, i_1 + 1, j_1 + 1]
+    p_2 = state[P, i_2 + 1, j_2 + 1]
+    jump = max(abs(p_0 - p_1), abs(p_1 - p_2)) / (rim[RHO, k] * rim[C, k] * rim[C, k])
+    rough = (jump - CALM_PRESSURE_JUMP) / (SHOCK_PRESSURE_JUMP - CALM_PRESSURE_JUMP)
+    rough = min(max(rough, 0.0), 1.0)
+    smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
+    part = smooth * (0.5 * rim[LENGTH, k] / rim[DISTANCE_NEXT, k])
+    return s_0 + part * limit_gently(s_0 - s_1, s_1 - s_2)
+
+
+@inlined
+def resolve_cell(values, i, j, nx, ny):
+    """s_nn, s_tt, s_nt of a cell."""
+    return resolve_stress(
+        values[S_XX, i + 1, j + 1],
+        values[S_YY, i + 1, j + 1],
+        values[S_XY, i + 1, j + 1],
+        nx,
+        ny,
+    )
+
+
+@kernel(allocates=False)
+def start_stress(values, state, shear, walls, inwards, first, sides, rim):
+    """Ghosts of the stress beyond walls; normal stress in the states at faces.
+
+    values (4, ni + 2, nj + 2): the fields of a solid; shear (ni, nj) [Pa]; walls (n, 3), inwards
+    (faces,): of `PerimeterPlan`; the cells of the sides must be gathered.  sides (4, faces):
+    nothing acts along a face until a coupling says otherwise.
+    """
+    ni, nj = shear.shape
+    for wall in range(walls.shape[0]):
+        for k in range(walls[wall, 0], walls[wall, 1]):
+            nx, ny = find_normal(rim, k)
+            s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_CELL, k)
+            s_nn, s_tt, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
+            ghost = compose_stress(s_nn, s_tt, -s_nt, nx, ny)
+            put_stress(rim, first, CARRIED_GHOST, k, ghost)
+    for k in range(rim.shape[1]):
+        _, speed, _ = find_shear_wave(rim, first, k, 0.0, CARRIED_CELL, RHO)
+        sides[SHEAR_STRESS, k] = 0.0
+        sides[SPEED_ALONG, k] = speed
+        if not inwards[k]:
+            continue
+        side, i, j = find_cell(k, ni, nj)
+        deep = (ni if side < 2 else nj) > 2
+        if deep and shear[i, j] > 0.0:
+            s_nn = extrapolate_stress(values, state, rim, k, (ni, nj))
+        else:
+            nx, ny = find_normal(rim, k)
+            s_nn, _, _ = resolve_cell(values, i, j, nx, ny)
+        c = rim[C_FACE, k]
+        rim[C_FACE, k] = add_shear_wave(c * c, shear[i, j], rim[RHO_FACE, k]) ** 0.5
+        rim[P_FACE, k] -= s_nn
+
+
+@kernel(allocates=False)
+def fill_stress_ghosts(shear, spans, first, sides, rim):
+    """Ghosts beyond contacts and free surfaces, of state and stress, from their contact states.
+
+    spans (n, 2): of faces that go with the flow.  The normal stress changes by twice what it
+    differs from that of the contact, as in an elastic wave along the normal: so much of it by the
+    pressure as c² is of c_l².  Along the face the ghost is as far beyond what `sides` have of the
+    contact as the cell is short of it.  Theory F20.7.
+    """
+    ni, nj = shear.shape
+    for number in range(spans.shape[0]):
+        for k in range(spans[number, 0], spans[number, 1]):
+            _, i, j = find_cell(k, ni, nj)
+            nx, ny = find_normal(rim, k)
+            s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_CELL, k)
+            s_nn, s_tt, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
+            c2 = rim[C, k] * rim[C, k]
+            wave_c2 = add_shear_wave(c2, shear[i, j], rim[RHO, k])
+            rise = 2.0 * (rim[P_STAR, k] - (rim[P, k] - s_nn))
+            by_pressure = rise * (c2 / wave_c2)
+            by_stress = rise - by_pressure
+            rim[RHO_GHOST, k] = rim[RHO, k] + rise / wave_c2
+            rim[P_GHOST, k] = rim[P, k] + by_pressure
+            ghost_nt = 2.0 * sides[SHEAR_STRESS, k] - s_nt
+            ghost = compose_stress(s_nn - by_stress, s_tt + 0.5 * by_stress, ghost_nt, nx, ny)
+            put_stress(rim, first, CARRIED_GHOST, k, ghost)
+            speed = rim[V, k] * nx - rim[U, k] * ny
+            more = 2.0 * (sides[SPEED_ALONG, k] - speed)
+            rim[U_GHOST, k] -= more * ny
+            rim[V_GHOST, k] += more * nx
+
+
+@compiled_once(allocates=False)
+def press_with_stress(rim, first, k, shear):
+    """Let the trace of a face have its normal stress for a pressure, and c_l for a sound speed."""
+    nx, ny = find_normal(rim, k)
+    s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_TRACE, k)
+    s_nn, _, _ = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
+    c2 = add_shear_wave(rim[C2_TRACE, k], shear, rim[RHO_TRACE, k])
+    rim[P_TRACE, k] -= s_nn
+    rim[C2_TRACE, k] = c2
+    rim[C_TRACE, k] = c2**0.5
+
+
+@kernel(allocates=False)
+def trace_stress_moving(slopes, centres, shear, spans, first, rim):
+    """Stress in the traces at the faces of the spans (n, 2), at the old time.
+
+    slopes (4, 3, ni, nj), centres: of `hydro.carried.transport`, of the fields of a solid.
+    """
+    ni, nj = shear.shape
+    for number in range(spans.shape[0]):
+        for k in range(spans[number, 0], spans[number, 1]):
+            _, i, j = find_cell(k, ni, nj)
+            x = rim[X_TRACE, k]
+            y = rim[Y_TRACE, k]
+            stress = (
+                find_value(slopes[S_XX], centres, i, j, x, y),
+                find_value(slopes[S_YY], centres, i, j, x, y),
+                find_value(slopes[S_XY], centres, i, j, x, y),
+            )
+            put_stress(rim, first, CARRIED_TRACE, k, stress)
+            press_with_stress(rim, first, k, shear[i, j])
+
+
+@inlined
+def find_shear_wave(rim, first, k, shear, part, state):
+    """(z, speed, stress) of `compute_shear_contact` at a face, t being that of its normal.
+
+    part: row of the stress, CARRIED_CELL or CARRIED_TRACE; state: first of the rows rho, u, v.
+    """
+    nx, ny = find_normal(rim, k)
+    s_xx, s_yy, s_xy = get_stress(rim, first, part, k)
+    _, _, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
+    speed = rim[state + V, k] * nx - rim[state + U, k] * ny
+    return (rim[state + RHO, k] * shear) ** 0.5, speed, s_nt
+
+
+@compiled_once(allocates=False)
+def keep_face_speed(rim, sides, k, across):
+    """Velocity of a face's contact, of its speeds across it and along it."""
+    nx, ny = find_normal(rim, k)
+    along = sides[SPEED_ALONG, k]
+    sides[SPEED_X, k] = across * nx - along * ny
+    sides[SPEED_Y, k] = across * ny + along * nx
+
+
+@compiled_once(allocates=False)
+def pull_along(rim, k, stress, speed, curved):
+    """Add to the outward fluxes of a face the shear stress on it, and its work at `speed`."""
+    area_x = rim[AREA_X, k]
+    area_y = rim[AREA_Y, k]
+    rim[MOMENTUM_X, k] += stress * area_y
+    rim[ENERGY, k] -= stress * speed * (area_x * area_x + area_y * area_y) ** 0.5
+    if curved:
+        rim[PUSH, k] -= stress * rim[NX, k]
+        rim[HOOP, k] -= stress * area_x
+    else:
+        rim[MOMENTUM_Y, k] -= stress * area_x
+
+
+@kernel(allocates=False)
+def trace_stress(shear, plan, wave_law, first, curved, sides, rim):
+    """Stress in the traces on the moved faces; fluxes of walls and open sides, with it.
+
+    plan: walls and open sides of `PerimeterPlan`.  sides (4, faces) is filled: every face slips
+    without friction, and goes as fast as it sweeps, until a coupling says otherwise.
+    """
+    ni, nj = shear.shape
+    walls, opened = plan
+    for k in range(rim.shape[1]):
+        _, i, j = find_cell(k, ni, nj)
+        press_with_stress(rim, first, k, shear[i, j])
+        z, speed, stress = find_shear_wave(rim, first, k, shear[i, j], CARRIED_TRACE, RHO_TRACE)
+        sides[SHEAR_STRESS, k] = 0.0
+        sides[SPEED_ALONG, k] = speed - stress / z if z > 0.0 else speed
+        nx, ny = rim[NX, k], rim[NY, k]
+        keep_face_speed(rim, sides, k, rim[SWEEP, k] / (nx * nx + ny * ny) ** 0.5)
+    fill_wall_fluxes(rim, walls, wave_law, curved)
+    fill_open_fluxes(rim, opened, curved)
+    carry_fields_through_open_sides(rim, opened)
+    for number in range(opened.shape[0]):
+        for k in range(opened[number, 0], opened[number, 1]):
+            let_stress_pass(rim, sides, first, k, opened[number, 2] == RHO_TRACE, curved)
+
+
+@compiled_once(allocates=False)
+def let_stress_pass(rim, sides, first, k, goes_on, curved):
+    """Shear stress at an open face: that of the trace where the solid goes on, else none."""
+    nx, ny = find_normal(rim, k)
+    if goes_on:
+        _, speed, stress = find_shear_wave(rim, first, k, 0.0, CARRIED_TRACE, RHO_TRACE)
+        sides[SHEAR_STRESS, k] = stress
+        sides[SPEED_ALONG, k] = speed
+        pull_along(rim, k, stress, speed, curved)
+    keep_face_speed(rim, sides, k, rim[U_TRACE, k] * nx + rim[V_TRACE, k] * ny)
+
+
+@kernel(allocates=False)
+def stick_together(one, other, pairs, phase, mass_passes, curved):
+    """What acts along faces that stick together, into both rims: bonds and seams.
+
+    one, other: (rim, sides, shear, number of the first field) of both; pairs, phase: as of
+    `hydro.perimeter.contacts`, whose own part of the phase must be done.  mass_passes: faces of a
+    seam do not go with the material, whose speed is that of the contact.
+    """
+    rim, sides, shear, field = one
+    other_rim, other_sides, other_shear, other_field = other
+    first, other_first, step, count = pairs
+    ni, nj = shear.shape
+    other_ni, other_nj = other_shear.shape
+    part = CARRIED_CELL if phase == AT_CELLS else CARRIED_TRACE
+    state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
+    for n in range(count):
+        k = first + n
+        m = other_first + step * n
+        _, i, j = find_cell(k, ni, nj)
+        _, a, b = find_cell(m, other_ni, other_nj)
+        z, speed, own = find_shear_wave(rim, field, k, shear[i, j], part, state)
+        z_beyond, speed_beyond, beyond = find_shear_wave(
+            other_rim, other_field, m, other_shear[a, b], part, state
+        )
+        # the other's normal and direction along the face are turned: speeds change their sign
+        stress, along = compute_shear_contact((z, speed, own), (z_beyond, -speed_beyond, beyond))
+        sides[SHEAR_STRESS, k] = other_sides[SHEAR_STRESS, m] = stress
+        sides[SPEED_ALONG, k] = along
+        other_sides[SPEED_ALONG, m] = -along
+        if phase == AT_TRACES:
+            go_along(rim, k, along)
+            go_along(other_rim, m, -along)
+        elif phase == AT_FLUX:
+            pull_along(rim, k, stress, along, curved)
+            pull_along(other_rim, m, stress, -along, curved)
+            across = rim[SWEEP, k] / (rim[NX, k] ** 2 + rim[NY, k] ** 2) ** 0.5
+            if mass_passes:
+                across = find_speed_across(rim, k, other_rim, m)
+            keep_face_speed(rim, sides, k, across)
+            keep_face_speed(other_rim, other_sides, m, -across)
+
+
+@inlined
+def go_along(rim, k, along):
+    """Let the velocity of the contact at a face have this speed along it."""
+    nx, ny = find_normal(rim, k)
+    rim[U_STAR, k] = rim[W_STAR, k] * nx - along * ny
+    rim[V_STAR, k] = rim[W_STAR, k] * ny + along * nx
+
+
+@inlined
+def find_speed_across(rim, k, other, m):
+    """Acoustic speed of the contact between two traces, along the normal of face k."""
+    nx, ny = find_normal(rim, k)
+    z = rim[RHO_TRACE, k] * rim[C_TRACE, k]
+    z_beyond = other[RHO_TRACE, m] * other[C_TRACE, m]
+    w = rim[U_TRACE, k] * nx + rim[V_TRACE, k] * ny
+    w_beyond = other[U_TRACE, m] * nx + other[V_TRACE, m] * ny
+    push = rim[P_TRACE, k] - other[P_TRACE, m]
+    return ((z * w + z_beyond * w_beyond) + push) / (z + z_beyond)

@@ -1,0 +1,195 @@
+"""The stress of a block of solid, through the phases of a step.
+
+Deviatoric stress and plastic strain are carried fields: they ride with the mass.  In a step,
+beside the phases of the flow (`hydro.phases`):
+
+    start     shear modulus; ghosts beyond walls, normal stress at the faces of the sides
+    predict   ghosts beyond contacts, stress at mid-time and its divergence        theory F20.3
+    trace     stress at the faces of the sides, in the fluxes of walls and open sides
+    prepare   forces of the stress on the faces inside, for the flow's update      theory F20.5
+    relax     after fluxes and fields: strain, rotation and yield                  theory F20.8
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.eos.conversion import compute_temperature, has_voids
+from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART
+from shockgrid.hydro.interior.solid import make_solid_arrays
+from shockgrid.hydro.rows import RHO, P
+from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.rates import (
+    EQUIVALENT,
+    PLASTIC_STRAIN,
+    RATE_ROWS,
+    make_fill_forces,
+    make_measure_rates,
+    make_predict_rates,
+    make_predict_stress,
+    update_stress,
+)
+from shockgrid.hydro.strength.sides import (
+    SIDE_ROWS,
+    fill_stress_ghosts,
+    start_stress,
+    trace_stress,
+    trace_stress_moving,
+)
+from shockgrid.regrid.errors import BadInput
+
+STRESS_FIELDS = (
+    CarriedField("s_xx", "Pa", "deviatoric stress xx"),
+    CarriedField("s_yy", "Pa", "deviatoric stress yy"),
+    CarriedField("s_xy", "Pa", "deviatoric stress xy"),
+    CarriedField("plastic_strain", "1", "equivalent plastic strain"),
+)
+
+
+def add_stress_fields(
+    block: str, eos: Any, fields: tuple[CarriedField, ...]
+) -> tuple[CarriedField, ...]:
+    """The carried fields of a block of solid: those given, and those of its stress that lack.
+
+    A field of the stress may be among those given, with first values of its own.  Raises BadInput
+    for the equation of state of a gas, and one without a density at rest.
+    """
+    if not getattr(eos, "opens_voids", True):
+        raise BadInput(f"block {block!r}: strength is for solids, and {eos.kind!r} is a gas")
+    if getattr(eos, "rho0", None) is None:
+        raise BadInput(
+            f"block {block!r}: strength wants an equation of state with a density at rest, rho0; "
+            f"{eos.kind!r} has none"
+        )
+    given = {field.name: field for field in fields}
+    own = [given.pop(field.name, field) for field in STRESS_FIELDS]
+    return (*own, *given.values())
+
+
+def stiffen_wave_law(wave_law: tuple[float, ...], eos: Any, law: StrengthLaw) -> tuple[float, ...]:
+    """`EquationOfState.wave_law` with the impedance at rest of longitudinal waves."""
+    a, b, z = wave_law
+    rest = np.array([float(eos.rho0)])
+    temperature = eos.temperature(rest, 0.0 * rest) if law.needs_temperature else None
+    shear = float(law.shear_modulus(rest, 0.0 * rest, temperature)[0])
+    return a, b, float(z * z + LONGITUDINAL_PART * shear * eos.rho0) ** 0.5
+
+
+class Stress:
+    """Arrays of the stress of a block of ni × nj cells, and its phases.
+
+    arrays: what the flow's kernels take, with the shear modulus; rates (5, ni, nj): see
+    `hydro.strength.rates`; sides (4, faces): see `hydro.strength.sides`.  The fields of the stress
+    are the first of the block's carried ones.
+    """
+
+    FIRST_FIELD = 0
+
+    def __init__(self, law: StrengthLaw, ni: int, nj: int):
+        self.law = law
+        self.arrays = make_solid_arrays(ni, nj)
+        self.rates = np.zeros((RATE_ROWS, ni, nj))
+        self.sides = np.zeros((SIDE_ROWS, 2 * (ni + nj)))
+
+    def start(self, block: Any) -> None:
+        """Phase 2, when the cells along the sides are gathered: see `start_stress`."""
+        held = block.list_starts()
+        shear = self._find_shear(block, held)
+        torn = has_voids(held, slice(None), slice(None))
+        self.arrays.shear[...] = np.where(torn, 0.0, shear)
+        start_stress(
+            block.get_start("carried"), block.start, self.arrays.shear, block.plan.walls,
+            block.plan.inwards, self.FIRST_FIELD, self.sides, block.rim.rows,
+        )  # fmt: skip
+
+    def predict(self, block: Any, dt: float) -> None:
+        """Phase 2, after the couplings, in place of the transport's phase."""
+        half_dt = 0.5 * dt
+        arrays = self.arrays
+        transport = block.transport
+        rows = block.rows.start, block.rows.stop
+        values = block.get_start("carried")
+        fill_stress_ghosts(
+            arrays.shear, block.plan.moving, self.FIRST_FIELD, self.sides, block.rim.rows
+        )
+        transport.predict(block, half_dt)
+        make_predict_rates(block.geometry)(
+            block.start, block.nodes, transport.measures, transport.centres, rows, self.rates
+        )
+        laws = self._find_laws(block, block.list_starts(), values)
+        make_predict_stress(block.geometry)(
+            values, transport.slopes, self.rates, laws, half_dt, transport.centres, rows, arrays
+        )
+
+    def trace_moving(self, block: Any) -> None:
+        """Phase 2, at the end: the traces at faces that go with the flow."""
+        transport = block.transport
+        trace_stress_moving(
+            transport.slopes, transport.centres, self.arrays.shear, block.plan.moving,
+            self.FIRST_FIELD, block.rim.rows,
+        )  # fmt: skip
+
+    def trace(self, block: Any) -> None:
+        """Phase 6, with the traces of the sides known, before the couplings' fluxes."""
+        trace_stress(
+            self.arrays.shear, (block.plan.walls, block.plan.opened), block.wave_law,
+            self.FIRST_FIELD, block.geometry.curved, self.sides, block.rim.rows,
+        )  # fmt: skip
+
+    def prepare(self, block: Any) -> None:
+        """Phase 6, before the flow's update: forces on the faces inside."""
+        transport = block.transport
+        make_fill_forces(block.geometry)(
+            transport.slopes, transport.centres, block.nodes, block.nodes_new,
+            (block.rows.start, block.rows.stop), self.arrays,
+        )  # fmt: skip
+
+    def relax(self, block: Any, dt: float) -> None:
+        """Phase 6, after the fields have been carried: the new stress."""
+        arrays = self.arrays
+        rows = block.rows.start, block.rows.stop
+        make_measure_rates(block.geometry)(
+            block.nodes, block.nodes_new, arrays.speed_i, arrays.speed_j, self.sides, rows,
+            self.rates,
+        )  # fmt: skip
+        held = block.list_new()
+        laws = self._find_laws(block, held, block.carried_new)
+        shear = self._find_shear(block, held)
+        update_stress(block.carried_new, self.rates, laws, shear, tuple(held), dt, rows)
+
+    def _list_state(self, block: Any, held: Sequence[np.ndarray]) -> tuple:
+        """Density, pressure and, where the law asks for it, temperature of cells, (ni, nj) each.
+
+        held: what the cells hold, in the order of HELD_ARRAYS.
+        """
+        state, *others = held
+        inside = state[:, 1:-1, 1:-1]
+        temperature = None
+        if self.law.needs_temperature:
+            temperature = compute_temperature(block.eos, inside, *others)
+        return inside[RHO], inside[P], temperature
+
+    def _find_shear(self, block: Any, held: Sequence[np.ndarray]) -> np.ndarray:
+        """Shear modulus (ni, nj) [Pa] of the law; no number where there is no state."""
+        with np.errstate(all="ignore"):
+            shear = self.law.shear_modulus(*self._list_state(block, held))
+        return np.ascontiguousarray(shear)
+
+    def _find_laws(
+        self, block: Any, held: Sequence[np.ndarray], carried: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Flow stress and hardening (ni, nj) [Pa] of the law, at the rates of `rates`."""
+        strain = carried[self.FIRST_FIELD + PLASTIC_STRAIN, 1:-1, 1:-1]
+        with np.errstate(all="ignore"):
+            states = self._list_state(block, held)
+            flow_stress = self.law.flow_stress(strain, self.rates[EQUIVALENT], *states)
+            hardening = self.law.hardening(strain, self.rates[EQUIVALENT], *states)
+        return np.ascontiguousarray(flow_stress), np.ascontiguousarray(hardening)
+
+    def list_for_link(self, block: Any) -> tuple:
+        """What `stick_together` takes of a block."""
+        return block.rim.rows, self.sides, self.arrays.shear, self.FIRST_FIELD

@@ -1,0 +1,136 @@
+"""Strength: exact elastic-plastic waves, conservation, free stream, mirror images."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from builders import box, free, march, wall_off
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos import IdealGas, MieGruneisen
+from shockgrid.hydro.formulas.geometry import GEOMETRIES
+from shockgrid.hydro.formulas.strength import (
+    compose_stress,
+    compute_equivalent,
+    resolve_stress,
+    return_to_yield,
+    turn_stress,
+)
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.strength.laws import Perfect
+from shockgrid.problems.references.elastic_plastic import Solid, compute_piston
+from shockgrid.regrid.errors import BadInput
+
+ALUMINIUM = MieGruneisen(2785.0, 5328.0, 1.338, 2.0, strength=1e10)
+LAW = Perfect(27.6e9, 0.3e9)
+STRESS = (3e7, -8e7, 5e7)
+
+
+def drive(speed, cells=200, law=LAW, end=6e-6):
+    """A piston in a bar in plane strain; the block at the end, and the time."""
+    nodes = box((0.0, 0.0), (0.05, 0.001), (cells, 3))
+    bar = Block("bar", ALUMINIUM, nodes, ALUMINIUM.rho0, 0.0, 0.0, 0.0, strength=law)
+    put(bar, "i_min", "piston", velocity=(speed, 0.0))
+    wall_off(bar)
+    simulation = Simulation([bar], [], t_end=end)
+    march(simulation)
+    return simulation.blocks[0], simulation.t
+
+
+@pytest.mark.parametrize("speed", [200.0, pytest.param(400.0, marks=pytest.mark.slow)])
+def test_piston_sends_an_elastic_precursor_and_a_plastic_shock(speed):
+    bar, t = drive(speed)
+    solid = Solid(ALUMINIUM, ALUMINIUM.rho0, LAW.modulus, LAW.yield_strength)
+    elastic, plastic = compute_piston(solid, speed)
+    x = bar.centres[0][:, 1]
+    rho, u, v, p = bar.state[:, 1:-1, 2]
+    stress = p - bar.carried[0, 1:-1, 2]
+    front = plastic.shock_speed * t
+    behind = (x > 0.6 * front + 0.4 * speed * t) & (x < 0.9 * front + 0.1 * speed * t)
+    assert u[behind] == pytest.approx(speed, rel=1e-3)
+    assert stress[behind] == pytest.approx(plastic.stress, rel=1e-3)
+    assert rho[behind] == pytest.approx(plastic.rho, rel=1e-3)
+    # the elastic plateau: where neither wave is near
+    ahead = elastic.shock_speed * t
+    between = (x > front + 0.55 * (ahead - front)) & (x < front + 0.65 * (ahead - front))
+    assert u[between] == pytest.approx(elastic.u, rel=6e-3)
+    # where mass is that of a sharp front
+    middle = 0.5 * (elastic.u + speed)
+    last = np.flatnonzero(u > middle)[-1]
+    at = np.interp(middle, u[[last + 1, last]], x[[last + 1, last]])
+    assert at == pytest.approx(front, rel=1e-3)
+    assert np.abs(v).max() < 1e-9 * speed
+
+
+def make_gust(geometry="plane", turned=False):
+    """A closed box of metal that is thrown about, far beyond its yield; mirrored along x."""
+    nodes = box((0.0, 0.01), (0.05, 0.04), (20, 12))
+    x, y = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
+    x, y = (0.5 * (line[:, 1:] + line[:, :-1]) for line in (x, y))
+    u = 300.0 * np.sin(150.0 * x + 100.0 * y)
+    v = -200.0 * np.cos(130.0 * x - 70.0 * y)
+    rho = 2785.0 * (1.0 + 0.01 * np.sin(200.0 * x))
+    if turned:
+        rho, u, v = rho[::-1], -u[::-1], v[::-1]
+    block = Block("metal", ALUMINIUM, nodes, rho, u, v, 1e8, strength=LAW)
+    wall_off(block)
+    return Simulation([block], [], t_end=1e-5, geometry=geometry)
+
+
+@pytest.mark.parametrize("geometry", list(GEOMETRIES))
+def test_mass_and_energy_stay_and_stress_is_within_the_yield_surface(geometry):
+    simulation = make_gust(geometry)
+    rows = march(simulation)
+    for name in ("total_mass_metal", "total_energy"):
+        values = np.array([row[name] for row in rows])
+        assert np.ptp(values) < 1e-13 * values[0], name
+    (block,) = simulation.blocks
+    s_xx, s_yy, s_xy, strain = block.carried[:, 1:-1, 1:-1]
+    assert compute_equivalent(s_xx, s_yy, s_xy).max() < (1.0 + 1e-12) * LAW.yield_strength
+    assert strain.max() > 0.1
+
+
+def test_free_metal_flies_on_without_stress():
+    nodes = box((0.0, 0.0), (0.05, 0.03), (16, 10))
+    block = Block("metal", ALUMINIUM, nodes, 2785.0, 300.0, -200.0, 0.0, strength=LAW)
+    free(block)
+    march(Simulation([block], [], t_end=1e-5))
+    stiffness = 2785.0 * 5328.0**2
+    assert np.abs(block.carried[:3]).max() < 1e-13 * stiffness
+    assert np.abs(block.state[3]).max() < 1e-13 * stiffness
+    assert np.ptp(block.state[1, 1:-1, 1:-1]) < 1e-10
+
+
+def test_formulas_of_a_stress():
+    nx, ny = np.cos(0.7), np.sin(0.7)
+    tensor = np.array([[STRESS[0], STRESS[2]], [STRESS[2], STRESS[1]]])
+    normal = np.array([nx, ny])
+    along = np.array([-ny, nx])
+    s_nn, s_tt, s_nt = resolve_stress(*STRESS, nx, ny)
+    found = normal @ tensor @ normal, along @ tensor @ along, normal @ tensor @ along
+    assert found == pytest.approx((s_nn, s_tt, s_nt))
+    assert compose_stress(s_nn, s_tt, s_nt, nx, ny) == pytest.approx(STRESS)
+    # a turn by twice the angle whose tangent is given
+    half = 0.2
+    turn = 2.0 * np.arctan(half)
+    matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    turned = matrix @ tensor @ matrix.T
+    assert turn_stress(*STRESS, half) == pytest.approx((turned[0, 0], turned[1, 1], turned[0, 1]))
+    assert compute_equivalent(*turn_stress(*STRESS, half)) == pytest.approx(
+        compute_equivalent(*STRESS), rel=1e-15
+    )
+
+
+@pytest.mark.parametrize("hardening", [0.0, 1e9])
+def test_yield_brings_the_stress_back_along_the_radius(hardening):
+    *back, strain = return_to_yield(*STRESS, 27e9, 5e7, hardening)
+    assert compute_equivalent(*back) == pytest.approx(5e7 + hardening * strain)
+    assert np.array(back) / back[0] == pytest.approx(np.array(STRESS) / STRESS[0])
+    *kept, none = return_to_yield(*STRESS, 27e9, 5e8, hardening)
+    assert none == 0.0 and kept == pytest.approx(STRESS, rel=1e-15)
+
+
+def test_a_gas_has_no_strength():
+    with pytest.raises(BadInput, match="strength is for solids"):
+        Block("air", IdealGas(1.4), box((0.0, 0.0), (1.0, 1.0), (4, 4)), 1, 0, 0, 1, strength=LAW)

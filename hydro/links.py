@@ -107,7 +107,8 @@ class Link:
         elif phase != AT_TRACES:
             pass_seam(*self._rims, phase, curved)
         if self._sticking is not None:
-            stick_together(*self._sticking, phase, self.passes_mass, curved)
+            one, other, pairs = self._sticking
+            stick_together(one, other, pairs, phase, self.passes_mass, curved)
 
     def copy_line_to_follower(self) -> None:
         """Copy the leader's new nodes to the follower."""

@@ -7,6 +7,8 @@ between them.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from shockgrid.hydro.block import Block
@@ -118,13 +120,13 @@ def fill_polygons(block: Block) -> None:
     )
 
 
-def _list_old(block: Block) -> tuple[np.ndarray, ...]:
+def _list_old(block: Block) -> tuple[Any, ...]:
     """Kernel input at the start of the step: what cells hold (HELD_ARRAYS), then nodes.
 
     Of a solid, then the arrays of its stress.
     """
     if block.stress is not None:
-        return *block.list_starts(), block.nodes, block.stress.arrays  # type: ignore[return-value]
+        return *block.list_starts(), block.nodes, block.stress.arrays
     return *block.list_starts(), block.nodes
 
 

@@ -1,4 +1,4 @@
-"""Draws the pictures of README: plate-on-wedge-strip, mushroom-strip and growth-rate.png.
+"""Draws pictures of README and the index: plate-on-wedge-strip, mushroom-strip and growth-rate.png.
 
 shockgrid run plate-on-wedge-apart --set cells=[160,48] --set output.dumps=28 -o out/plate
 shockgrid run interface-instability-mushroom --set cells=256 -o out/mushroom

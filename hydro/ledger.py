@@ -62,7 +62,7 @@ class Ledger:
         self.momentum_in += gained[:2]
         self.energy_in += float(gained[2])
 
-    def count_void_energy(self, work: float, energy: float) -> None:
+    def count_energy_of_voids(self, work: float, energy: float) -> None:
         """Take the work of voids that resist their closing out of the boundary's energy: it is
         theirs."""
         self.energy_in -= work

@@ -281,6 +281,6 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     if flow.source.function is not None:
         flow.ledger.add_source(flow.source.gained)
     flow.ledger.add_boundary(dt)
-    flow.ledger.count_void_energy(flow.voids.work, flow.voids.energy_left)
+    flow.ledger.count_energy_of_voids(flow.voids.work, flow.voids.energy_left)
     rate = flow.small_cells.find_rate()
     record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.sides.stretching)

@@ -49,4 +49,4 @@ def test_an_example_runs_to_its_end(name, tmp_path):
 def test_the_page_of_examples_lists_them_all():
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
     assert [name for name in NAMES if f"| `{name}` |" not in page] == []
-    assert len(NAMES) == 10
+    assert len(NAMES) == 12

@@ -60,11 +60,11 @@ def test_the_pinned_packages_are_allowed_by_pyproject(requirement):
 
 
 def test_pythons_of_the_matrix_are_those_of_the_classifiers(workflows):
-    matrix = workflows["tests.yml"]["jobs"]["tests"]["strategy"]["matrix"]
+    matrix = workflows["weekly.yml"]["jobs"]["tests"]["strategy"]["matrix"]
     assert matrix["python"] == find_pythons()
     assert find_pythons()[0] == PROJECT["requires-python"].removeprefix(">=")
     systems = {name.partition("-")[0] for name in matrix["os"]}
     assert systems == {"ubuntu", "macos", "windows"}
-    wheel = workflows["tests.yml"]["jobs"]["wheel"]["strategy"]["matrix"]
+    wheel = workflows["weekly.yml"]["jobs"]["wheel"]["strategy"]["matrix"]
     assert wheel["os"] == matrix["os"]
     assert wheel["python"] == [find_pythons()[0], find_pythons()[-1]]

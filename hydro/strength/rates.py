@@ -14,6 +14,7 @@ from shockgrid.hydro.carried.transport import (
     LENGTH_J,
     find_value,
     make_difference_weights,
+    place_ghosts,
 )
 from shockgrid.hydro.eos.conversion import has_voids
 from shockgrid.hydro.formulas.geometry import Geometry, lean_lines
@@ -31,7 +32,7 @@ from shockgrid.hydro.formulas.strength import (
 )
 from shockgrid.hydro.interior.scratch import find_twist
 from shockgrid.hydro.perimeter.faces import find_corners
-from shockgrid.hydro.rim import find_first_face
+from shockgrid.hydro.rim import U_GHOST, V_GHOST, find_first_face
 from shockgrid.hydro.rows import U, V
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN
@@ -111,10 +112,16 @@ def make_predict_rates(geometry: Geometry):
         keep_rates(rates, i, j, (u_x, u_y, v_x, v_y), hoop)
 
     @kernel(allocates=False)
-    def predict_rates(state, nodes, measures, centres, rows, rates):
-        """Rates (5, ni, nj) from a state with ghosts; measures, centres: of `Transport`."""
+    def predict_rates(state, rim, nodes, lines, rows, rates):
+        """Rates (5, ni, nj) from a state, whose ghosts are those of the rim from now on.
+
+        lines: measures and centres of `Transport`.
+        """
+        measures, centres = lines
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
+        place_ghosts(rim, U_GHOST, state[U])
+        place_ghosts(rim, V_GHOST, state[V])
         for i in range(ni):
             for j in range(nj):
                 if is_read(i, j, ni, nj, rows):

@@ -12,6 +12,7 @@ towards the outside the shear stress is s_nt, with t = (-n_y, n_x) of the outwar
 from __future__ import annotations
 
 from shockgrid.hydro.carried.transport import find_value
+from shockgrid.hydro.formulas import riemann
 from shockgrid.hydro.formulas.reconstruction import limit_gently
 from shockgrid.hydro.formulas.strength import (
     add_shear_wave,
@@ -56,6 +57,7 @@ from shockgrid.hydro.rim import (
     RHO_GHOST,
     RHO_TRACE,
     SWEEP,
+    SWEPT,
     U_GHOST,
     U_STAR,
     U_TRACE,
@@ -359,11 +361,19 @@ def go_along(rim, k, along):
 
 @inlined
 def find_speed_across(rim, k, other, m):
-    """Acoustic speed of the contact between two traces, along the normal of face k."""
-    nx, ny = find_normal(rim, k)
-    z = rim[RHO_TRACE, k] * rim[C_TRACE, k]
-    z_beyond = other[RHO_TRACE, m] * other[C_TRACE, m]
-    w = rim[U_TRACE, k] * nx + rim[V_TRACE, k] * ny
-    w_beyond = other[U_TRACE, m] * nx + other[V_TRACE, m] * ny
-    push = rim[P_TRACE, k] - other[P_TRACE, m]
-    return ((z * w + z_beyond * w_beyond) + push) / (z + z_beyond)
+    """Speed along the normal of face k of the contact between two traces: HLLC, as inside."""
+    area_x, area_y = rim[AREA_X, k], rim[AREA_Y, k]
+    square = area_x * area_x + area_y * area_y
+    w, w_beyond = riemann.compute_normal_speeds(
+        rim[U_TRACE, k], rim[V_TRACE, k], other[U_TRACE, m], other[V_TRACE, m],
+        area_x, area_y, rim[SWEPT, k],
+    )  # fmt: skip
+    wave, wave_beyond = riemann.compute_waves(
+        w, rim[C2_TRACE, k], w_beyond, other[C2_TRACE, m], square
+    )
+    push, drag, _, _ = riemann.compute_contact_speed(
+        (rim[RHO_TRACE, k], rim[P_TRACE, k], w, wave),
+        (other[RHO_TRACE, m], other[P_TRACE, m], w_beyond, wave_beyond),
+        square,
+    )
+    return (push / drag + rim[SWEPT, k]) / square**0.5

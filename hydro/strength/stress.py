@@ -118,7 +118,12 @@ class Stress:
         )
         transport.predict(block, half_dt)
         make_predict_rates(block.geometry)(
-            block.start, block.nodes, transport.measures, transport.centres, rows, self.rates
+            block.start,
+            block.rim.rows,
+            block.nodes,
+            (transport.measures, transport.centres),
+            rows,
+            self.rates,
         )
         laws = self._find_laws(block, block.list_starts(), values)
         make_predict_stress(block.geometry)(

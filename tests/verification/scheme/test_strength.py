@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
-from builders import box, free, march, wall_off
+from builders import box, check_restarts, free, march, wall_off
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas, MieGruneisen
@@ -17,10 +19,13 @@ from shockgrid.hydro.formulas.strength import (
     return_to_yield,
     turn_stress,
 )
+from shockgrid.hydro.links import join
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.strength.laws import Perfect
 from shockgrid.problems.references.elastic_plastic import Solid, compute_piston
 from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
+from thread_ranks import compare_with_ranks
 
 ALUMINIUM = MieGruneisen(2785.0, 5328.0, 1.338, 2.0, strength=1e10)
 LAW = Perfect(27.6e9, 0.3e9)
@@ -134,3 +139,131 @@ def test_yield_brings_the_stress_back_along_the_radius(hardening):
 def test_a_gas_has_no_strength():
     with pytest.raises(BadInput, match="strength is for solids"):
         Block("air", IdealGas(1.4), box((0.0, 0.0), (1.0, 1.0), (4, 4)), 1, 0, 0, 1, strength=LAW)
+
+
+def swing(nodes):
+    """A motion of the inner nodes of a box of metal."""
+    x, y = (line - line.min() for line in nodes)
+    wave = np.sin(np.pi * x / x.max()) * np.sin(np.pi * y / y.max())
+
+    def move(name, t):
+        return nodes + 1e-3 * np.sin(5e5 * t) * np.array([wave, -wave])
+
+    return move
+
+
+def make_seamed(cut=True, threads=1, cells=(16, 10), mesh="swing"):
+    """A box of metal that is thrown about on a grid that swings, of one block or cut in two."""
+    middle = cells[0] // 2
+    whole = box((0.0, 0.0), (0.05, 0.03), cells)
+    move = swing(whole)
+
+    def follow(name, t):
+        nodes = move(name, t)
+        return {"left": nodes[:, : middle + 1], "right": nodes[:, middle:]}.get(name, nodes)
+
+    parts = {"metal": whole}
+    if cut:
+        parts = {"left": whole[:, : middle + 1], "right": whole[:, middle:]}
+    blocks = []
+    for name, nodes in parts.items():
+        x, y = compute_centres(nodes)
+        u = 150.0 * np.sin(150.0 * x + 100.0 * y)
+        v = -100.0 * np.cos(130.0 * x - 70.0 * y)
+        blocks.append(Block(name, ALUMINIUM, nodes, 2785.0, u, v, 1e8, strength=LAW))
+    links = []
+    if cut:
+        links = [join("seam", (blocks[0], "i_max"), (blocks[1], "i_min"))]
+    for block in blocks:
+        wall_off(block)
+    mesh = follow if mesh == "swing" else mesh
+    return Simulation(blocks, links, t_end=4e-6, mesh=mesh, threads=threads)
+
+
+def test_a_seam_changes_nothing():
+    cut = make_seamed(True)
+    whole = make_seamed(False)
+    march(cut)
+    march(whole)
+    for name, size in (("state", 1e9), ("carried", LAW.yield_strength)):
+        found = np.concatenate([block.get_inside(name) for block in cut.blocks], axis=1)
+        expected = whole.blocks[0].get_inside(name)
+        assert np.abs(found - expected).max() < 1e-10 * size, name
+
+
+def test_restarts_threads_and_ranks_have_the_same_bits():
+    check_restarts(make_seamed, [3, 11])
+    compare_with_ranks(make_seamed, 6, (2,))
+    tall = functools.partial(make_seamed, False, cells=(70, 6), mesh="fixed")
+    compare_with_ranks(tall, 6, (3,), places=[(2, 0, 1)])
+
+
+def test_a_mirrored_box_stays_the_mirror_image():
+    plain = make_gust()
+    image = make_gust(turned=True)
+    for _ in range(20):
+        plain.advance()
+        image.advance()
+    (one,) = plain.blocks
+    (other,) = image.blocks
+    signs = np.reshape((1.0, -1.0, 1.0, 1.0), (4, 1, 1))
+    turned = signs * other.get_inside("state")[:, ::-1]
+    assert np.abs(turned - one.get_inside("state")).max() < 1e-11 * 1e9
+    signs = np.reshape((1.0, 1.0, -1.0, 1.0), (4, 1, 1))
+    turned = signs * other.get_inside("carried")[:, ::-1]
+    assert np.abs(turned - one.get_inside("carried")).max() < 1e-11 * 1e9
+
+
+def rub(bonded, speed=20.0, cells=60):
+    """Two slabs that lie on each other; the left one moves along. Blocks at the end, and t."""
+    left, right = (
+        Block(
+            name,
+            ALUMINIUM,
+            box((low, 0.0), (low + 0.03, 0.0015), (cells, 3)),
+            2785.0,
+            0.0,
+            v,
+            0.0,
+            strength=LAW,
+        )
+        for name, low, v in (("left", -0.03, speed), ("right", 0.0, 0.0))
+    )
+    links = [join("periodic", (block, "j_min"), (block, "j_max")) for block in (left, right)]
+    links.append(join("interface", (left, "i_max"), (right, "i_min"), bonded=bonded))
+    free(left, "i_min")
+    free(right, "i_max")
+    simulation = Simulation([left, right], links, t_end=6e-6)
+    march(simulation)
+    return simulation.blocks, simulation.t
+
+
+def test_a_bond_passes_shear_waves_and_a_frictionless_interface_none():
+    speed = 20.0
+    shear_speed = (LAW.modulus / 2785.0) ** 0.5
+    for block in rub(False, speed)[0]:
+        assert np.abs(block.carried[2]).max() < 1e-3
+        assert np.ptp(block.state[2, 1:-1, 1:-1]) < 1e-9
+    blocks, t = rub(True, speed)
+    for block in blocks:
+        x = np.abs(block.centres[0])
+        v = block.state[2, 1:-1, 1:-1]
+        s_xy = block.carried[2, 1:-1, 1:-1]
+        near = x < 0.7 * shear_speed * t
+        assert v[near] == pytest.approx(0.5 * speed, rel=2e-3)
+        assert s_xy[near] == pytest.approx(-0.5 * speed * 2785.0 * shear_speed, rel=2e-3)
+        # half of the step has come as far as shear waves go
+        passed = np.abs(v - (speed if block.name == "left" else 0.0)).sum(axis=0)
+        middle = passed * abs(x[1, 0] - x[0, 0]) / (0.5 * speed)
+        assert middle == pytest.approx(shear_speed * t, rel=5e-3)
+
+
+def test_what_cannot_be_bonded_is_refused():
+    nodes = box((0.0, 0.0), (1.0, 1.0), (4, 4))
+    metal = Block("metal", ALUMINIUM, nodes, 2785.0, 0.0, 0.0, 0.0, strength=LAW)
+    beside = nodes + np.array([1.0, 0.0])[:, None, None]
+    fluid = Block("fluid", ALUMINIUM, beside, 2785.0, 0.0, 0.0, 0.0)
+    with pytest.raises(BadInput, match="'fluid' has no strength"):
+        join("interface", (metal, "i_max"), (fluid, "i_min"), bonded=True)
+    with pytest.raises(BadInput, match="its strength differs"):
+        join("seam", (metal, "i_max"), (fluid, "i_min"))

@@ -14,7 +14,9 @@ from __future__ import annotations
 import numpy as np
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.rim import ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
+from shockgrid.hydro.eos.mixture import MASS_FRACTION
+from shockgrid.hydro.rim import CARRIED_FLUX, ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
+from shockgrid.hydro.rows import RHO
 from shockgrid.regrid.jit import kernel
 
 
@@ -37,12 +39,34 @@ def sum_fluxes(rim, spans):
     return mass, momentum_x, momentum_y, energy
 
 
+def sum_first_mass(block: Block) -> float:
+    """Mass of the first material in a block of two."""
+    mass = block.volume * block.state[RHO, 1:-1, 1:-1]
+    return float((mass * block.carried[MASS_FRACTION, 1:-1, 1:-1]).sum())
+
+
+def sum_first_flux(block: Block) -> float:
+    """Mass of the first material that leaves a block of two in a second."""
+    flux = block.rim.get_carried(CARRIED_FLUX)[MASS_FRACTION]
+    return float(sum(flux[first:last].sum() for first, last in block.plan.counted))
+
+
+def split_mass(masses: dict[str, float], names: tuple[str, str], mass: float, first: float) -> None:
+    """Add the mass of two materials of these names, of which `first` is the first one's."""
+    one, two = names
+    masses[one] += first
+    masses[two] += mass - first
+
+
 class Ledger:
     """Running boundary integrals, and the totals of the blocks, by the label of their material."""
 
     def __init__(self, blocks: list[Block]):
         self.blocks = blocks
-        self.materials = list(dict.fromkeys(block.material for block in blocks))
+        labels = [
+            name for block in blocks for name in block.eos.material_names or (block.material,)
+        ]
+        self.materials = list(dict.fromkeys(labels))
         self.mass_in = dict.fromkeys(self.materials, 0.0)
         self.momentum_in = np.zeros(2)
         self.energy_in = 0.0
@@ -52,7 +76,12 @@ class Ledger:
         """Add what came in during a step from the fluxes of the perimeters."""
         for block in self.blocks:
             mass, momentum_x, momentum_y, energy = sum_fluxes(block.rim.rows, block.plan.counted)
-            self.mass_in[block.material] -= dt * mass
+            names = block.eos.material_names
+            if names is None:
+                self.mass_in[block.material] -= dt * mass
+            else:
+                first = sum_first_flux(block)
+                split_mass(self.mass_in, names, -dt * mass, -dt * first)
             self.momentum_in[0] -= dt * momentum_x
             self.momentum_in[1] -= dt * momentum_y
             self.energy_in -= dt * energy
@@ -74,7 +103,11 @@ class Ledger:
         momentum_x = momentum_y = energy = 0.0
         for block in self.blocks:
             total = block.totals.sums
-            sums[block.material] += total.mass
+            names = block.eos.material_names
+            if names is None:
+                sums[block.material] += total.mass
+            else:
+                split_mass(sums, names, total.mass, sum_first_mass(block))
             momentum_x += total.momentum_x
             momentum_y += total.momentum_y
             energy += total.energy

@@ -35,6 +35,8 @@ from shockgrid.regrid.errors import BadInput, Place, RunFailure
 from shockgrid.regrid.sides import SIDE_NAMES
 
 LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
+# the same where the flow can go on without the line that makes the steps short
+LEAST_PART_BEFORE_HANDOVER = 0.02
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 # that a state has before its first step
 START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
@@ -60,6 +62,25 @@ class Refining(Protocol):
         ...
 
 
+class Joining(Protocol):
+    """What makes one block of two materials of two blocks; `hydro.remap.merging` says how."""
+
+    first_nodes: np.ndarray | None
+    name: str
+
+    def is_due(self, t: float) -> bool:
+        """Is it time [s] for it, and has it not been yet?"""
+        ...
+
+    def merge(self, blocks: Sequence[Block]) -> tuple[list[Block], list, Callable[[], object]]:
+        """The new block with the states of both, its links, and what makes its regridder."""
+        ...
+
+    def lay(self, state: Any) -> tuple[list[Block], list, Callable[[], object]] | None:
+        """The same of a state of `Simulation.get_state`; None where both blocks are in it."""
+        ...
+
+
 class Simulation:
     """Blocks marched together to `t_end`; obeys `problems.evolution.Evolution`.
 
@@ -72,7 +93,8 @@ class Simulation:
     `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells stay as many as
     they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
     surfaces holds when it closes, None: nothing; `find_end`: called after every step, gives words
-    for a run that has come to its end before `t_end`.  Raises BadInput for sides that are not
+    for a run that has come to its end before `t_end`; `handover`: lays both blocks on one of two
+    materials on the way (`hydro.remap.merging`).  Raises BadInput for sides that are not
     covered once by segments, and for blocks that lie on each other.
     """
 
@@ -95,6 +117,7 @@ class Simulation:
         refining: Refining | None = None,
         void_fill: tuple[float, float] | None = None,
         find_end: Callable[[Simulation], str | None] | None = None,
+        handover: Joining | None = None,
     ):
         self.geometry = find_geometry(geometry)
         _check_parts(blocks, links)
@@ -106,6 +129,7 @@ class Simulation:
         self._source = source
         self._void_fill = void_fill
         self._find_end = find_end
+        self.handover = handover
         self.refining = refining
         self._counts_cells = refining is not None
         self._connect(blocks, links, make_regridder)
@@ -213,6 +237,11 @@ class Simulation:
         """
         if ranks.cuts and self._flow.source.function is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
+        if self.handover is not None and ranks.size > 1:
+            raise BadInput(
+                "only one process can lay both materials on one grid during a run; leave handover "
+                "out, or run without MPI"
+            )
         if self.refining is not None and ranks.size > 1:
             raise BadInput(
                 "only one process can add grid lines during a run; set refine = false, or run "
@@ -264,15 +293,20 @@ class Simulation:
             touching = self.meetings.find(clock.t, clock.step)
             self._overlaps.check(clock.t, clock.step, touching)
             record = take_step(self._flow)
-        except RunFailure:  # all ranks have agreed on it
+        except RunFailure as failure:  # all ranks have agreed on it
             ranks.end_step()
-            raise
+            if self.handover is None or self.handover.first_nodes is not None:
+                raise
+            self._hand_over_after(failure)
+            return self.advance()
         self.last_reason = record.reason or self.last_reason
         # at the end, or with other grid lines from now on
         if record.last:
             self.finished = "t_end reached"
         elif self.refining is not None:
             self._refine(self.refining)
+        elif self.handover is not None and self.handover.is_due(clock.t):
+            self.hand_over()
         row = self.compute_row(record.limit, record.retries)
         self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
@@ -315,8 +349,44 @@ class Simulation:
         self.small_cells = SmallCells(self._shared, small.allowed, small.start)
         self._make_flow()
 
+    def hand_over(self) -> None:
+        """From now on both materials are in one block, and the line between them is a field.
+
+        Raises RunFailure where no grid is found for it, and nothing has changed.
+        """
+        assert self.handover is not None
+        counts = self.motion.counts
+        self._join_blocks(*self.handover.merge(self._blocks))
+        self.motion.counts = counts  # of the step that is over
+        self._update_rates()
+        self.clock.rate = self.small_cells.find_first_rate(self.t)
+
+    def _hand_over_after(self, failure: RunFailure) -> None:
+        """Lay both materials on one grid where the flow ends with their line, or say why not."""
+        self.last_reason = failure
+        try:
+            self.hand_over()
+        except (BadInput, RunFailure):
+            raise failure from None
+
+    def _join_blocks(
+        self, blocks: list[Block], links: list, make_regridder: Callable[[], object]
+    ) -> None:
+        """March these blocks from now on."""
+        self._line_rule = replace(self._line_rule, respacing=None)
+        self._connect(blocks, links, make_regridder)
+        ledger = self.ledger
+        self.ledger = Ledger(blocks)
+        self.ledger.set_state(ledger.get_state())
+        self.small_cells = SmallCells(self._shared, self.small_cells.allowed, 0.0)
+        self._make_flow()
+
     def adopt_cells(self, state) -> None:
         """Have as many cells as a state of `get_state`, where lines may come and go."""
+        if self.handover is not None and self.handover.first_nodes is None:
+            joined = self.handover.lay(state)
+            if joined is not None:
+                self._join_blocks(*joined)
         if self.refining is None:
             return
         states = [state.get(f"{block.name}/state") for block in self._blocks]
@@ -334,7 +404,9 @@ class Simulation:
         clock = self.clock
         ranks = self._shared
         dt, limit = clock.choose_dt()
-        if dt >= LEAST_PART * clock.first_stable_dt or limit == "t_end":
+        can_hand_over = self.handover is not None and self.handover.first_nodes is None
+        least = LEAST_PART_BEFORE_HANDOVER if can_hand_over else LEAST_PART
+        if dt >= least * clock.first_stable_dt or limit in ("t_end", "start"):
             return
         when = f"t = {clock.t:.6g} s (step {clock.step})"
         if limit == "retry" and self.last_reason:
@@ -382,6 +454,8 @@ class Simulation:
         }
         for number, contact in enumerate(self.exchange.contacts):
             state[f"contact{number}/fixed"] = contact.fixed.copy()
+        if self.handover is not None and self.handover.first_nodes is not None:
+            state[f"{self.handover.name}/first_nodes"] = self.handover.first_nodes
         for block in self.blocks:
             for name in block.step_arrays:
                 state[f"{block.name}/{name}"] = block.get_inside(name).copy()

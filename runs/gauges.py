@@ -50,6 +50,9 @@ class Places:
 
     def locate(self, blocks: Sequence[BlockView]) -> None:
         """Find all points in the present grids, each first where it was last."""
+        if len(self.allowed) != len(blocks):  # both materials are in one block from now on
+            self.allowed = np.ones((len(blocks), self.position.shape[1]), dtype=bool)
+            self.block[:] = OUTSIDE_ALL_BLOCKS
         pending = np.isfinite(self.position).all(axis=0)
         last = self.block.copy()
         self.block[~pending] = OUTSIDE_ALL_BLOCKS

@@ -72,6 +72,8 @@ class EquationOfState:
     # whether it knows the temperature of a material whose heat capacity [J/(kg K)] is given
     has_temperature: ClassVar[bool] = False
     heat_capacity: ClassVar[float] = 0.0  # of one material: see `with_heat_capacity`
+    # of the two materials of a mixture, where each has its own balance of mass
+    material_names: ClassVar[tuple[str, str] | None] = None
     limits: ClassVar[str] = ""  # a sentence on the states that there are, where that can be said
     failure: ClassVar[str] = "density or sound speed is no longer positive"
     failure_cause: ClassVar[str] = "no-state"  # its id in `runs.early_end.causes`

@@ -132,7 +132,8 @@ class Mixture(EquationOfState):
     """Two materials together, made by `mix`.
 
     first, second: their equations of state; usual_densities: a density [kg/m³] of each, which it
-    has where there is next to nothing of it.
+    has where there is next to nothing of it; material_names: in the ledger, None: theirs is
+    one balance of mass.
     """
 
     kind = "mixture"
@@ -145,10 +146,12 @@ class Mixture(EquationOfState):
         first: EquationOfState,
         second: EquationOfState,
         usual_densities: tuple[float, float],
+        material_names: tuple[str, str] | None,
     ):
         object.__setattr__(self, "first", first)
         object.__setattr__(self, "second", second)
         object.__setattr__(self, "usual_densities", usual_densities)
+        object.__setattr__(self, "material_names", material_names)
         object.__setattr__(self, "fields", None)
 
     @property
@@ -180,12 +183,16 @@ class Mixture(EquationOfState):
 
 
 def mix(
-    first: EquationOfState, second: EquationOfState, usual_densities: tuple[float, float]
+    first: EquationOfState,
+    second: EquationOfState,
+    usual_densities: tuple[float, float],
+    material_names: tuple[str, str] | None = None,
 ) -> Mixture:
     """The equation of state of two materials that share cells.
 
-    usual_densities: positive densities [kg/m³], such as those at the start.  Raises BadInput for a
-    material whose pressure is not linear in the energy, such as a table.
+    usual_densities: positive densities [kg/m³], such as those at the start; material_names: of both
+    in the history, where their masses are to be told apart.  Raises BadInput for a material whose
+    pressure is not linear in the energy, such as a table.
     """
     for material in (first, second):
         if not hasattr(type(material), "gruneisen_part"):
@@ -196,4 +203,4 @@ def mix(
     densities = tuple(float(value) for value in usual_densities)
     if not all(value > 0.0 for value in densities):
         raise BadInput(f"usual_densities are {usual_densities!r}; both must be positive")
-    return make_mixture_class(type(first), type(second))(first, second, densities)
+    return make_mixture_class(type(first), type(second))(first, second, densities, material_names)

@@ -91,9 +91,16 @@ class InterfaceDeck(Deck, kw_only=True):
         "of both sides in metres, not wavelengths. If left out: so long that no reflection returns",
     ) = None
     start: key(
-        Literal["auto", "crossed", "incident"],
-        "crossed: the shock is beyond the interface; incident: before it; auto: beyond if it can",
+        Literal["auto", "crossed", "incident", "captured"],
+        "crossed: the shock is beyond the interface; incident: before it; auto: beyond if it can; "
+        "captured: as auto, with both materials on one grid",
     ) = "auto"
+    handover: key(
+        bool, "where the line can no longer be followed, go on with both materials on one grid"
+    ) = False
+    handover_kct: key(
+        float | None, "k c t from which on both materials are on one grid", ge=-1e4, le=1e4
+    ) = None
     layer: key(
         float | None,
         "start crossed: cells to the nearer wave. If left out: those of 3/16 of the shortest "

@@ -18,11 +18,13 @@ import numpy as np
 
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture, mix
 from shockgrid.hydro.links import Link, join
+from shockgrid.hydro.mixture.phases import make_fraction_fields
 from shockgrid.hydro.motion.line import LineRule, Respacing
 from shockgrid.hydro.motion.smoothing import THICK_CELLS
 from shockgrid.hydro.rows import V
-from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.simulation import Joining, Simulation
 from shockgrid.problems.deck import MOST_CELLS
 from shockgrid.problems.initial_states import put_walls, settle_shock
 from shockgrid.problems.interface_instability.crossed_start import (
@@ -49,6 +51,13 @@ from shockgrid.problems.interface_instability.spacing import (
     Spacing,
 )
 from shockgrid.problems.interface_instability.theories import Growth, find_cautions
+from shockgrid.problems.interface_instability.zone import (
+    ZONE_BLOCK,
+    ZONE_UNITS,
+    make_zone_nodes,
+    measure_contact,
+    measure_zone,
+)
 from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.hugoniot import (
     Shock,
@@ -57,6 +66,7 @@ from shockgrid.problems.references.hugoniot import (
     shock_with_particle_speed,
 )
 from shockgrid.problems.references.linear_growth import LinearGrowth, compute_linear_growth
+from shockgrid.regrid.compilation.first_calls import is_interpreting
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.quality import find_bad_cells
 from shockgrid.regrid.roots import find_root
@@ -88,6 +98,7 @@ class InterfaceInstability(Results, Problem):
     units: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("interface_mean", "interface_max", "interface_min", "amplitude"), "m"),
         **{"roughness": "m", "largest_turn": "deg", "far_transverse_speed": "m/s"},
+        **ZONE_UNITS,
     }
 
     def __init__(self, deck: InterfaceDeck, perturbation: Perturbation | None = None):
@@ -134,6 +145,9 @@ class InterfaceInstability(Results, Problem):
         self.units = type(self).units | {h.column: "m" for h in self.followed}
         # of the shock at the mean line, on the clock of a run that begins before it
         arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
+        self.is_captured = deck.start == "captured"
+        self.may_hand_over = self.is_captured or deck.handover or deck.handover_kct is not None
+        self._check_handover()
         self.start = self._choose_start()
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
         self.arrival = arrival - self.begun
@@ -143,6 +157,68 @@ class InterfaceInstability(Results, Problem):
                 "; take a greater one, or start = 'incident'"
             )
             deck.refuse(self.t_end <= 0.0, "kct_end", wanted)
+
+    def _check_handover(self) -> None:
+        """Raise BadInput for keys that one grid of both materials cannot have."""
+        deck = self.deck
+        name = "start" if self.is_captured else "handover"
+        deck.refuse(
+            self.may_hand_over and deck.refine,
+            "refine",
+            f"{name} lays both materials on one grid, whose lines do not follow the interface",
+        )
+        deck.refuse(
+            self.may_hand_over and deck.line.tension > 0.0,
+            "line.tension",
+            f"{name} lays both materials on one grid, where no line has a tension",
+        )
+
+    @functools.cached_property
+    def mixture(self) -> Mixture:
+        """The equation of state of both materials on one grid."""
+        densities = self.rho_first, self.rho_second
+        return mix(self.eos_first, self.eos_second, densities, ("first", "second"))
+
+    def make_handover(self) -> Joining | None:
+        """When and how both blocks become one, if they may."""
+        if not self.may_hand_over:
+            return None
+        from shockgrid.hydro.remap.merging import Handover  # with scipy: slow to load
+
+        kct = self.deck.handover_kct
+        time = None if kct is None or self.is_captured else self.arrival + kct / self._rate
+        return Handover(time, self.mixture, self._make_zone_nodes, self._assemble_zone, ZONE_BLOCK)
+
+    def _make_zone_nodes(self, blocks: Sequence[Block]) -> np.ndarray:
+        first, second = blocks
+        sides = first.nodes[:, 0, :], second.nodes[:, -1, :]
+        line = first.nodes[:, -1, :]
+        return make_zone_nodes(Spacing(self.deck), sides, line, self.make_heights())
+
+    def _assemble_zone(self, nodes: np.ndarray, held: dict) -> tuple:
+        """The block of both materials, its links, and what makes its regridder."""
+        fields = make_fraction_fields(held["mass_fraction"], held["volume_fraction"])
+        state = [held[name] for name in ("rho", "u", "v", "p")]
+        block = Block(
+            ZONE_BLOCK,
+            self.mixture,
+            nodes,
+            *state,
+            material="first+second",
+            limiter=self.deck.limiter,
+            carried=fields,
+        )
+        self._bound_ends((block, 1.0), (block, 0.0))
+        links = []
+        if self.deck.sides == "periodic":
+            links.append(join("periodic", (block, "j_min"), (block, "j_max")))
+        put_walls(block)
+        choice = self.choose_family(block.nodes)
+        return (
+            [block],
+            links,
+            lambda: self.deck.regrid.make(threads=self.deck.run.threads, **choice),
+        )
 
     def _choose_start(self) -> str:
         """How the run begins: as the deck says, or after the passage where that can be had.
@@ -466,7 +542,7 @@ class InterfaceInstability(Results, Problem):
             from shockgrid.hydro.remap.flow import Refinement  # with scipy: slow to load
 
             refining = Refinement(blocks, self.assemble)
-        return self.simulate(
+        simulation = self.simulate(
             blocks,
             links,
             line_rule=LineRule(
@@ -474,7 +550,11 @@ class InterfaceInstability(Results, Problem):
             ),
             make_regridder=make_regridder,
             refining=refining,
+            handover=self.make_handover(),
         )
+        if self.is_captured and not is_interpreting():
+            simulation.hand_over()
+        return simulation
 
     def _make_states(self, grid: np.ndarray) -> Sequence:
         """rho, u, v, p of the cells of both blocks, the first of which has this grid."""
@@ -500,15 +580,7 @@ class InterfaceInstability(Results, Problem):
         ]
         tension = deck.line.tension
         links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
-        if self.has_open_ends:
-            speed = (self.theory.base.u, 0.0)
-            shock = self.shock
-            behind = shock.rho, shock.particle_speed, 0.0, shock.p
-            ahead = self.rho_second, 0.0, 0.0, deck.pressure
-            put(first, "i_min", "inflow", state=behind, velocity=speed)
-            put(second, "i_max", "inflow", state=ahead, velocity=speed)
-        else:
-            put(first, "i_min", "piston", velocity=self.make_piston())
+        self._bound_ends((first, None), (second, None))
         if deck.sides == "periodic":
             links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]
         put_walls(*blocks)
@@ -517,6 +589,22 @@ class InterfaceInstability(Results, Problem):
         # Each line keeps the law that it has at first: a mean of the outer ones' would bend lines.
         choices = iter([self.choose_family(block.nodes) for block in blocks])
         return blocks, links, lambda: deck.regrid.make(threads=deck.run.threads, **next(choices))
+
+    def _bound_ends(self, low: tuple, high: tuple) -> None:
+        """Put what bounds the far sides of two blocks, or of one: open ends, or the piston.
+
+        low, high: a block, and what its material there has of the fractions, None without these.
+        """
+        if not self.has_open_ends:
+            put(low[0], "i_min", "piston", velocity=self.make_piston())
+            return
+        shock = self.shock
+        behind = shock.rho, shock.particle_speed, 0.0, shock.p
+        ahead = self.rho_second, 0.0, 0.0, self.deck.pressure
+        for (block, part), side, state in ((low, "i_min", behind), (high, "i_max", ahead)):
+            options = {} if part is None else {"carried": dict.fromkeys(SEEN_FIELDS, part)}
+            speed = self.theory.base.u, 0.0
+            put(block, side, "inflow", state=state, velocity=speed, **options)
 
     def choose_family(self, nodes: np.ndarray) -> dict:
         """Options of the regridder of a block with these first nodes, besides the deck's."""
@@ -556,7 +644,12 @@ class InterfaceInstability(Results, Problem):
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
-        line = evolution.blocks[0].nodes[:, -1, :]
+        first = evolution.blocks[0]
+        far = {"far_transverse_speed": max(map(measure_far_speed, evolution.blocks))}
+        if first.name == ZONE_BLOCK:
+            contact = measure_contact(first, self.k, self.followed)
+            return contact | far | measure_zone(first)
+        line = first.nodes[:, -1, :]
         mean, most, least, roughness, turn = measure_shape(
             line, self.k, self._numbers, self.deck.sides == "wall"
         )
@@ -568,7 +661,8 @@ class InterfaceInstability(Results, Problem):
             **{h.column: measure_mode(line, self.k, h.number, h.phase) for h in self.followed},
             "roughness": roughness,
             "largest_turn": math.degrees(turn),
-            "far_transverse_speed": max(map(measure_far_speed, evolution.blocks)),
+            **far,
+            **(dict.fromkeys(ZONE_UNITS, 0.0) if self.may_hand_over else {}),
         }
 
     def cautions(self, history=None) -> list[str]:
@@ -578,6 +672,9 @@ class InterfaceInstability(Results, Problem):
 def measure_far_speed(block: Block) -> float:
     """The greatest transverse speed [m/s] in the far field of a block."""
     depth = max(1, int(FAR_FIELD_PART * block.ni))
+    if block.name == ZONE_BLOCK:
+        ends = block.state[V, 1 : depth + 1, 1:-1], block.state[V, -depth - 1 : -1, 1:-1]
+        return max(float(np.abs(v).max()) for v in ends)
     start = 1 if block.name == "first" else block.ni - depth + 1
     v = block.state[V, start : start + depth, 1:-1]
     return max(0.0, float(v.max()), -float(v.min()))

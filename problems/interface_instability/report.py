@@ -16,6 +16,7 @@ from shockgrid.problems.interface_instability.theories import (
     is_still,
     predict_amplitude,
 )
+from shockgrid.problems.interface_instability.zone import find_lines
 from shockgrid.problems.pictures import (
     Colours,
     choose_even_dumps,
@@ -319,7 +320,8 @@ class Results:
         shown = []
         dumps = choose_even_dumps(run, SHOWN_TIMES)
         margin = 0.05 * self.deck.wavelength
-        lines = [dump.blocks[0].nodes[:, -1, :] for dump in dumps]
+        drawn = [find_lines(dump.blocks) for dump in dumps]
+        lines = [np.concatenate(curves, axis=1) for curves in drawn]
         # all panels are as wide as the widest needs
         reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
         for dump, (x, _) in zip(dumps, lines, strict=True):
@@ -330,11 +332,11 @@ class Results:
                 shown.append(block.cell_fields["rho"][inside])
         rho = np.concatenate(shown) if shown else np.empty(0)
         panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
-        for axes, dump, line, window in zip(panels, dumps, lines, windows, strict=True):
+        for axes, dump, curves, window in zip(panels, dumps, drawn, windows, strict=True):
             title = f"density and grid, {self.scale_time(dump.t)}"
             colours = Colours(low=rho.min(), high=rho.max())
             picture = draw_field(axes, dump, "rho", colours, every=1, title=title)
-            draw_lines(axes, [line])
+            draw_lines(axes, curves)
             axes.set_xlim(*window)
         if panels:
             label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")
@@ -370,8 +372,10 @@ class Results:
                 theory = first * predict_amplitude(self.theory, numbers * kct[row])
                 axes.semilogy(numbers, np.abs(theory) * self.k, "--", color=colour, lw=1)
             if run.dumps:
-                x, y = find_dump(run, float(history["t"][row])).blocks[0].nodes[:, -1, :]
-                lines.plot(x - x.mean(), y, color=colour, lw=1)
+                curves = find_lines(find_dump(run, float(history["t"][row])).blocks)
+                mean = np.concatenate(curves, axis=1)[0].mean()
+                for x, y in curves:
+                    lines.plot(x - mean, y, color=colour, lw=1)
         axes.plot([], [], "k--", lw=1, label="linear compressible")
         axes.set(xlabel="number of the mode", ylabel="k $|a_n|$ of mode n, k = 2π / wavelength")
         unit = "m" if self.t_unit == "s" else "1"

@@ -442,9 +442,12 @@ def _caution_steep_line(problem, history) -> list[str]:
             f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
             f"cells = {2 * LEAST_MUSHROOM_CELLS} or refine = true"
         )
-    if history is not None and "largest_turn" in history:  # not of an earlier version
-        first = float(history["largest_turn"][0])
-        turn = float(np.nanmax(history["largest_turn"]))
+    turns = [] if history is None else history.get("largest_turn", [])
+    turns = np.asarray(turns, dtype=float)
+    turns = turns[np.isfinite(turns)]  # no line of earlier versions, and none that is a field
+    if turns.size:
+        first = float(turns[0])
+        turn = float(turns.max())
         if turn > max(POLYGON_TURN, 1.2 * first):
             cautions.append(
                 f"the line turns by up to {turn:.0f} degrees from one segment to the next: it is a "
@@ -512,7 +515,7 @@ def _caution_line(problem, history) -> list[str]:
     if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []
     last = float(growth.scale_roughness(history)[gentle][-1])
-    if last <= ROUGH_LINE:
+    if not last > ROUGH_LINE:  # nor where the line has become a field
         return []
     return [
         f"the interface is rough: harmonics above the fourth are {last:.2g} of the largest mode at "

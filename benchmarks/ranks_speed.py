@@ -1,6 +1,6 @@
 """What ranks of MPI gain: whole commands and their steps, in strong and in weak scaling.
 
-    python benchmarks/bench_mpi.py [--rounds 3] [--sizes 200 1000] [--json docs/results/mpi.json]
+    python benchmarks/ranks_speed.py [--rounds 3] [--sizes 200 1000] [--json docs/results/mpi.json]
 
 Runs of `interface-instability` in two square blocks, with the shock at the interface from the first
 steps on: in one process, on two threads, on 1 and 2 ranks with a thread each, on 4 ranks (more than

@@ -207,7 +207,7 @@ def ease_row(ease, i, low, cells, Z):
 
 @kernel(allocates=False)
 def subtract_far_curve(curve, i, low, cells, Z):
-    """Subtract the edges of `curve` from the edges along j of node row i (theory R4.17)."""
+    """Subtract the edges of `curve` from the edges along j of node row i (theory R4.16)."""
     x, y = curve[0, i, low : low + cells + 1], curve[1, i, low : low + cells + 1]
     for col in range(cells):
         Z[FAR_EDGE_X + col] -= x[col + 1] - x[col]
@@ -216,7 +216,7 @@ def subtract_far_curve(curve, i, low, cells, Z):
 
 @kernel(allocates=False)
 def subtract_line_curve(curve, i, low, count, Z):
-    """Subtract the force of `curve` from that along i between node rows i, i+1 (theory R4.17)."""
+    """Subtract the force of `curve` from that along i between node rows i, i+1 (theory R4.16)."""
     x0, y0 = curve[0, i, low : low + count], curve[1, i, low : low + count]
     x1, y1 = curve[0, i + 1, low : low + count], curve[1, i + 1, low : low + count]
     for col in range(count):

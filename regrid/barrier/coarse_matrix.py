@@ -4,7 +4,7 @@ A coarse cell of m_i × m_j fine ones contributes to each of its four corners a 
 
     (m_j/m_i) A'T_aa A + 2 A'T_ab B + (m_i/m_j) B'T_bb B
 
-with A, B the differences of the displacements of its corners along i and j (theory R4.13).  T is
+with A, B the differences of the displacements of its corners along i and j (theory R4.14).  T is
 the sum of the blocks of the four corners of that fine cell, of its straight lines and of its
 cost, in differences of nodes.  If two or four fine cells share the centre, their mean is used, so
 that a mirrored block has the mirrored matrix.  One cell represents all: where the intended
@@ -38,12 +38,17 @@ COARSE_FACTOR = 17
 COARSE_ROWS = 21
 # Scratch: the lower and upper edge along i, the near and far one along j, inverse conditional
 # lengths of the four, straight-line weights, sound speed, weight of the barrier, and T: aa, ab, bb.
+# Kept from one line of coarse nodes to the next: the stretched block aa, the odd part of ab, and
+# what both edges give the node at a corner.
 LOW_X, LOW_Y, UP_X, UP_Y, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(8)
 LOW_G, UP_G, NEAR_G, FAR_G, LINE_Q, SIDE_Q, SOUND, WEIGHT = range(8, 16)
 BLOCK_AA = 16
 BLOCK_AB = 19
 BLOCK_BB = 23
-COARSE_SCRATCH_ROWS = 26
+STRETCHED_AA = 26
+ODD_AB = 29
+CORNER_OWN = 30
+COARSE_SCRATCH_ROWS = 33
 
 
 @inlined
@@ -267,19 +272,19 @@ def couple_nodes(stretch, lines, count, Z, here, after):
         add_symmetric(here, COARSE_OWN, k, both, across)
         subtract_symmetric(after, COARSE_OWN, k, both, across)
         # kept for the next line of nodes
-        Z[BLOCK_AA, k] = aa_xx
-        Z[BLOCK_AA + 1, k] = aa_xy
-        Z[BLOCK_AA + 2, k] = aa_yy
-        Z[BLOCK_AB, k] = odd
-        Z[BLOCK_BB, k] = both[0]
-        Z[BLOCK_BB + 1, k] = both[1]
-        Z[BLOCK_BB + 2, k] = both[2]
+        Z[STRETCHED_AA, k] = aa_xx
+        Z[STRETCHED_AA + 1, k] = aa_xy
+        Z[STRETCHED_AA + 2, k] = aa_yy
+        Z[ODD_AB, k] = odd
+        Z[CORNER_OWN, k] = both[0]
+        Z[CORNER_OWN + 1, k] = both[1]
+        Z[CORNER_OWN + 2, k] = both[2]
     # the same towards the next line of nodes
     for k in range(count):
-        aa_xx, aa_xy, aa_yy = take_symmetric(Z, BLOCK_AA, k)
-        odd = Z[BLOCK_AB, k]
+        aa_xx, aa_xy, aa_yy = take_symmetric(Z, STRETCHED_AA, k)
+        odd = Z[ODD_AB, k]
         add_block(here, COARSE_EAST, k + 1, (-aa_xx, -(odd + aa_xy), odd - aa_xy, -aa_yy))
-        both = take_symmetric(Z, BLOCK_BB, k)
+        both = take_symmetric(Z, CORNER_OWN, k)
         across = take_symmetric(here, COARSE_ACROSS, k)
         subtract_symmetric(here, COARSE_OWN, k + 1, both, across)
         add_symmetric(after, COARSE_OWN, k + 1, both, across)

@@ -169,7 +169,7 @@ class CornerTerms(NamedTuple):
 
 @inlined
 def take_corner_numbers(inputs):
-    """The `CornerNumbers` of a block; `inputs` is a `BarrierInputs`."""
+    """The `CornerNumbers` of a block; `inputs` are `BarrierInputs`."""
     lam = inputs.area_weight
     c = inputs.area_target
     return CornerNumbers(lam, c, lam * c, lam / c)
@@ -331,13 +331,13 @@ def find_mid_lines(low, up, near, far):
 
 @inlined
 def has_cell_terms(inputs):
-    """Whether a block has terms of cells at all; `inputs` is a `BarrierInputs`."""
+    """Whether any term of cells has a weight in this block; `inputs` are `BarrierInputs`."""
     return inputs.cost_weight > 0.0
 
 
 @inlined
 def take_cell_numbers(inputs):
-    """The `CellNumbers` of a block; `inputs` is a `BarrierInputs`."""
+    """The `CellNumbers` of a block; `inputs` are `BarrierInputs`."""
     return CellNumbers(inputs.cost_scale, inputs.cost_weight * inputs.sigma)
 
 

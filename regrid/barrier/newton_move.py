@@ -86,13 +86,17 @@ class NewtonMove:
         self.strayed = np.inf
         self.quality: tuple[float, float, int, int] | None = None
         self.triangles = -1  # unknown
-        # the residual that was estimated, and whether the last solve failed
+        # of the displaced grid: least ratio of its corners to the old ones, estimated residual
+        self.displaced_ratio = 0.0
         self.estimate = np.inf
+        # of the last solve: residual of the grid it began with, whether it failed
+        self.error = np.inf
         self.solve_failed = False
         self._begin()
-        self.exempt_corners = work.block.turned_corners
+        self.exempt_corners = work.side_numbers.turned_corners
 
     def report(self) -> RegridReport:
+        """What the move took, and the quality of its grid."""
         inner = (self.work.ni - 1) * (self.work.nj - 1)
         return RegridReport(
             iterations=self.iterations,
@@ -108,8 +112,11 @@ class NewtonMove:
             quality=self.quality,
         )
 
-    def is_settled(self) -> bool:
-        """Check the residual of the displaced grid: True if that is `work.trial` and final."""
+    def try_displaced_grid(self) -> bool:
+        """Displace the old grid with its sides, and correct its smooth errors.
+
+        True if its residual is small then: it is `work.trial`.
+        """
         work = self.work
         tuning = self.tuning
         if work.ni == 1 or work.nj == 1:
@@ -162,7 +169,7 @@ class NewtonMove:
         return True
 
     def run(self) -> bool:
-        """Perform the whole move if `is_settled` returned False, in halves if necessary.
+        """Perform the whole move if `try_displaced_grid` returned False, in halves if necessary.
 
         True when `work.trial` is valid.
         """
@@ -195,7 +202,7 @@ class NewtonMove:
             ):
                 side[:] = last if part == parts else first + fraction * (last - first)
             self._begin()
-            if not (self.is_settled() or self._advance()):
+            if not (self.try_displaced_grid() or self._advance()):
                 return False
             work.old[:] = work.trial
         self.sub_moves = parts - 1
@@ -208,7 +215,7 @@ class NewtonMove:
 
         Where none settles, the one closest to it is taken (theory R5.4).
         """
-        self._check_orientation()
+        self._require_orientation()
         work = self.work
         if work.ni == 1 or work.nj == 1:
             return False
@@ -290,7 +297,7 @@ class NewtonMove:
         self.ratio = np.inf
         return self._accept(work.compare_corners(work.trial, old))
 
-    def _check_orientation(self) -> None:
+    def _require_orientation(self) -> None:
         """Raise `Folded` unless the block's orientation was chosen for untangling."""
         if not self.untangles:
             raise Folded
@@ -332,7 +339,7 @@ class NewtonMove:
             is_folded = ratio == 0.0
         # unfolded if necessary
         if is_folded:
-            self._check_orientation()
+            self._require_orientation()
             if not ((not can_start and self._follow()) or self._untangle()):
                 return False
             ratio = 0.0
@@ -522,8 +529,8 @@ class NewtonMove:
         work = self.work
         self.rescues += 1
         self.start = "untangled"
-        trial_least_area = work.compute_energy(work.trial, 1.0)[1]
-        displaced_least_area = work.compute_energy(work.base, 1.0)[1]
+        trial_least_area = work.compute_least_area(work.trial)
+        displaced_least_area = work.compute_least_area(work.base)
         if displaced_least_area < trial_least_area:
             work.base[:] = work.trial
         if not untangle(work, work.base, self.tuning):

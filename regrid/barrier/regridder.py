@@ -308,8 +308,10 @@ class BarrierRegridder:
         is_checked = self.meets_itself or untangles
         if self.cuts and not is_checked:
             is_checked = find_crossing(boundary, self.cuts) is None
-        is_simple = work.block.area > 0.0 and (is_checked or (not self.cuts and work.is_simple))
-        if not (is_simple and move.is_settled()):
+        is_simple = work.side_numbers.area > 0.0 and (
+            is_checked or (not self.cuts and work.is_simple)
+        )
+        if not (is_simple and move.try_displaced_grid()):
             if not move.estimate < np.inf:  # otherwise all nodes are finite
                 if not all(np.isfinite(side).all() for side in get_sides(work.sides)):
                     raise explain_failure(boundary)

@@ -70,89 +70,113 @@ def repair_grid(nodes: np.ndarray, project: bool = True, cuts: Cuts = ()) -> Rep
     Raises RegridFailure, naming the bad cells, where no valid grid is found; BadInput for nodes
     that are not finite.  Grids may turn either way.  `cuts`: see `BarrierRegridder`.
     """
-    nodes = np.array(nodes, dtype=np.float64, order="C")
-    if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
-        raise BadInput(f"repair: nodes must have shape (2, ni+1, nj+1), got {nodes.shape}")
-    if not np.isfinite(nodes).all():
-        broken = np.argwhere(~np.isfinite(nodes).all(axis=0))[0]
-        raise BadInput(f"repair: node ({broken[0]}, {broken[1]}) is not a finite number")
+    nodes = _take_nodes(nodes)
     cuts = take_cuts(cuts)
     flip = slice(None, None, -1) if compute_area(nodes) < 0.0 else slice(None)
     nodes = np.ascontiguousarray(nodes[flip])
+    # bad cells, projected where they are few
     excluded = find_excluded_corners(nodes)
     bad = find_folded_cells(nodes, excluded)
-    before = len(bad)
+    bad_before = len(bad)
     projected = 0
     start = ""
     if len(bad) and project and len(bad) <= max(4, LOCAL_FOLD_FRACTION * excluded[0].size):
         projected = project_nodes(nodes, excluded)
         bad = find_folded_cells(nodes, excluded)
+    # the whole grid made anew
     if len(bad):
-        simple = find_crossing(nodes, cuts) is None
-        if simple and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
+        is_simple = find_crossing(nodes, cuts) is None
+        if is_simple and min(nodes.shape[1:]) > 2 and not is_collapsed(excluded):
             start = _regrid(nodes, cuts)
         bad = find_folded_cells(nodes, excluded)
     if len(bad):
-        named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
-        more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
-        also = f"cells {named}{more} stay folded"
-        if is_collapsed(excluded):
-            raise RegridFailure(
-                f"a side has nodes in one point, and such a block cannot be untangled; {also}",
-                grid=nodes[flip],
-            )
-        raise explain_failure(nodes, nodes, also=also, grid=nodes[flip], cuts=cuts)
-    if before and find_crossing(nodes, cuts) is not None:
+        raise _explain_folds(nodes, bad, excluded, cuts, nodes[flip])
+    if bad_before and find_crossing(nodes, cuts) is not None:
         raise explain_failure(nodes, grid=nodes[flip], cuts=cuts)
-    report = RepairReport(before, int(excluded.sum()), projected, bool(start), start)
+    report = RepairReport(bad_before, int(excluded.sum()), projected, bool(start), start)
     return Repaired(np.ascontiguousarray(nodes[flip]), report)
+
+
+def _take_nodes(nodes) -> np.ndarray:
+    """A copy of a grid's nodes; BadInput where they are none."""
+    nodes = np.array(nodes, dtype=np.float64, order="C")
+    if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
+        raise BadInput(f"repair: nodes must have shape (2, ni+1, nj+1), got {nodes.shape}")
+    if not np.isfinite(nodes).all():
+        i, j = np.argwhere(~np.isfinite(nodes).all(axis=0))[0]
+        raise BadInput(f"repair: node ({i}, {j}) is not a finite number")
+    return nodes
+
+
+def _explain_folds(nodes, bad, excluded, cuts: Cuts, grid) -> RegridFailure:
+    """The failure of a repair: cells that stay folded, in the grid as it was given."""
+    named = ", ".join(f"({i}, {j})" for i, j in bad[:NAMED_CELLS])
+    more = f" and {len(bad) - NAMED_CELLS} more" if len(bad) > NAMED_CELLS else ""
+    folded = f"cells {named}{more} stay folded"
+    if is_collapsed(excluded):
+        return RegridFailure(
+            f"a side has nodes in one point, and such a block cannot be untangled; {folded}",
+            grid=grid,
+        )
+    return explain_failure(nodes, nodes, also=folded, grid=grid, cuts=cuts)
 
 
 def project_nodes(nodes: np.ndarray, excluded: np.ndarray) -> int:
     """Project inner nodes at corners of over 180 degrees, in place, round by round; how many.
 
-    A corner's node goes onto the segment between its neighbours in the cell and BEYOND past it,
-    where that leaves fewer bad corners among those that it belongs to.
+    A corner's node goes onto the segment between its neighbours in the cell, and past it by
+    PROJECTION_OVERSHOOT, where that leaves fewer bad corners among those that it belongs to.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     moved: set[tuple[int, int]] = set()
     for _ in range(MOST_PROJECTION_ROUNDS):
-        wrong = (compute_corner_signs(nodes) <= 0) & ~excluded
-        if not wrong.any():
+        is_bad = (compute_corner_signs(nodes) <= 0) & ~excluded
+        if not is_bad.any():
             break
         progress = False
-        for corner, i, j in np.argwhere(wrong):
-            (a, b), before, after = TRIANGLES[corner][0], *TRIANGLES[corner][1:]
-            p = i + a
-            q = j + b
+        for corner, i, j in np.argwhere(is_bad):
+            # the corner's node, and its two neighbours in the cell
+            own, before, after = TRIANGLES[corner]
+            p = i + own[0]
+            q = j + own[1]
             if not (0 < p < ni and 0 < q < nj):
                 continue
-            here = nodes[:, p, q].copy()
-            count = _count_wrong(nodes, excluded, p, q)
-            if count == 0:
-                continue
-            start = nodes[:, i + before[0], j + before[1]]
-            step = nodes[:, i + after[0], j + after[1]] - start
-            length = float(step @ step)
-            if length == 0.0:
-                continue
-            part = min(max(float((here - start) @ step) / length, 0.1), 0.9)
-            # Past the segment is to its right, so that before -> after turns left round the node.
-            outward = np.array([step[1], -step[0]])
-            for beyond in (PROJECTION_OVERSHOOT, -PROJECTION_OVERSHOOT):
-                nodes[:, p, q] = start + part * step + beyond * outward
-                if _count_wrong(nodes, excluded, p, q) < count:
-                    progress = True
-                    moved.add((int(p), int(q)))
-                    break
-            else:
-                nodes[:, p, q] = here
+            first = nodes[:, i + before[0], j + before[1]]
+            second = nodes[:, i + after[0], j + after[1]]
+            if _project_node(nodes, excluded, (int(p), int(q)), first, second):
+                progress = True
+                moved.add((int(p), int(q)))
         if not progress:
             break
     return len(moved)
 
 
-def _count_wrong(nodes, excluded, p: int, q: int) -> int:
+def _project_node(nodes, excluded, place: tuple[int, int], first, second) -> bool:
+    """Project a node to the segment from `first` to `second`, and past it; False if that is no use.
+
+    It is, where fewer of the corners around the node are bad afterwards.
+    """
+    p, q = place
+    old_place = nodes[:, p, q].copy()
+    bad_count = _count_bad_corners(nodes, excluded, p, q)
+    if bad_count == 0:
+        return False
+    step = second - first
+    square = float(step @ step)
+    if square == 0.0:
+        return False
+    fraction = min(max(float((old_place - first) @ step) / square, 0.1), 0.9)
+    # Past the segment is to its right, so that first -> second turns left round the node.
+    outward = np.array([step[1], -step[0]])
+    for overshoot in (PROJECTION_OVERSHOOT, -PROJECTION_OVERSHOOT):
+        nodes[:, p, q] = first + fraction * step + overshoot * outward
+        if _count_bad_corners(nodes, excluded, p, q) < bad_count:
+            return True
+    nodes[:, p, q] = old_place
+    return False
+
+
+def _count_bad_corners(nodes, excluded, p: int, q: int) -> int:
     """Bad corners of the four cells round an inner node."""
     signs = compute_corner_signs(nodes[:, p - 1 : p + 2, q - 1 : q + 2])
     return int(((signs <= 0) & ~excluded[:, p - 1 : p + 1, q - 1 : q + 1]).sum())

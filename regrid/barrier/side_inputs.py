@@ -369,8 +369,8 @@ def compute_limiting_rate(sound, along_i, along_j, blend_i, blend_j, area_target
     return margin * np.sqrt(2.0 * most) / area_target
 
 
-class Block(NamedTuple):
-    """What `prepare` finds of a block's sides.
+class SideNumbers(NamedTuple):
+    """Numbers that `prepare` finds of a block's sides.
 
     The `area` inside them, the number of corners that they turn over, two of their edges that may
     meet (`search_meeting`), and numbers of `BarrierInputs`.
@@ -420,4 +420,4 @@ def prepare(old, inputs, motion, conditional, rate_limits, check):
     meeting, _ = search_meeting(sides, line, boxes, ways, ends, stack)
     turned_corners = count_turned_corners(sides)
     area = compute_area(sides)
-    return Block(area, turned_corners, meeting, sigma, area_target, cost_scale)
+    return SideNumbers(area, turned_corners, meeting, sigma, area_target, cost_scale)

@@ -51,7 +51,7 @@ from shockgrid.regrid.measure.corners import (
     count_turned_corners,
 )
 from shockgrid.regrid.measure.faults import check_grids, explain_failure
-from shockgrid.regrid.measure.quality import compute_corner_areas
+from shockgrid.regrid.measure.quality import compute_corner_areas, find_areas, take_edges
 from shockgrid.regrid.protocol import RegridReport, RegridResult
 from shockgrid.regrid.sides import compute_area, copy_sides, get_sides
 
@@ -92,9 +92,11 @@ STARTS = ("displacement", "previous", "quasi-1d")
 MOST_BOUNDARY_HALVINGS = 10  # nested, of the boundary's motion
 MOST_TAU_ROUNDS = 400
 LEAST_SWEEP_TAU = 0.5**20
-KEPT_SHARE = 0.5
+KEPT_AREA_PART = 0.5  # of a corner that is below its floor already
+# least new corner area relative to the old one; the paper has 0, plain convexity
+LEAST_AREA_PART = 0.1
 JOINING_GAP_LINES = 4  # boxes with a gap of fewer lines are one
-PARABOLA_RANGE = (0.05, 2.0)
+PARABOLA_RANGE = (0.05, 2.0)  # of tau_s where a parabola gives it
 
 
 @inlined
@@ -294,7 +296,7 @@ def fill_row_of_cells(nodes, i, tables, pull, box, Z):
 
 @kernel
 def fill_directions(nodes, tables, numbers, boxes, kept, Z, out, per_line):
-    """Direction D of (9) for the inner nodes of boxes of lines, into `out` (2, ni+1, nj+1).
+    """Direction D (R3.3) for the inner nodes of boxes of lines, into `out` (2, ni+1, nj+1).
 
     `boxes` (n, 4): first line, last line + 1, first row, last row + 1, at most MOST_CHUNK_LINES
     lines; nodes outside have D = 0.  `tables` of edges along i and j; `numbers`: pull, the factor
@@ -370,48 +372,44 @@ def fill_active_boxes(ni, nj, per_line, old_boxes, boxes):
             if per_line[LINE_LAST, j] < 0.0:
                 continue
             # the line with its neighbours, from its first active row to its last
-            low, high = max(1, j - 1), min(nj, j + 2)
-            top = int(per_line[LINE_FIRST, j]) - 1
-            end = int(per_line[LINE_LAST, j]) + 2
-            top = max(1, top)
-            end = min(ni, end)
+            first_line = max(1, j - 1)
+            stop_line = min(nj, j + 2)
+            first_row = max(1, int(per_line[LINE_FIRST, j]) - 1)
+            stop_row = min(ni, int(per_line[LINE_LAST, j]) + 2)
             # joined to the box before where they are close
-            last = boxes[count - 1]
-            if (
-                count > 0
-                and low - last[1] < JOINING_GAP_LINES
-                and high - last[0] <= MOST_CHUNK_LINES
-            ):
-                last[1], last[2], last[3] = max(high, last[1]), min(top, last[2]), max(end, last[3])
-                continue
             if count > 0:
-                low = max(low, last[1])
+                last = boxes[count - 1]
+                is_close = first_line - last[1] < JOINING_GAP_LINES
+                if is_close and stop_line - last[0] <= MOST_CHUNK_LINES:
+                    last[1] = max(stop_line, last[1])
+                    last[2] = min(first_row, last[2])
+                    last[3] = max(stop_row, last[3])
+                    continue
+                first_line = max(first_line, last[1])
             # or a box of its own
-            if low < high:
+            if first_line < stop_line:
                 new = boxes[count]
-                new[0] = low
-                new[1] = high
-                new[2] = top
-                new[3] = end
+                new[0] = first_line
+                new[1] = stop_line
+                new[2] = first_row
+                new[3] = stop_row
                 count += 1
     return count
 
 
 def cut_block(ni: int, nj: int) -> np.ndarray:
     """Boxes (n, 4) of all inner nodes, of equal width."""
-    ends = 1 + (nj - 1) * np.arange(-(-(nj - 1) // MOST_CHUNK_LINES) + 1) // -(
-        -(nj - 1) // MOST_CHUNK_LINES
+    count = -(-(nj - 1) // MOST_CHUNK_LINES)
+    ends = 1 + (nj - 1) * np.arange(count + 1) // count
+    first_rows = np.ones_like(ends[1:])
+    return np.ascontiguousarray(
+        np.stack([ends[:-1], ends[1:], first_rows, ni * first_rows], axis=1)
     )
-    rows = np.ones_like(ends[1:])
-    return np.ascontiguousarray(np.stack([ends[:-1], ends[1:], rows, ni * rows], axis=1))
 
 
 def count_nodes(boxes: np.ndarray) -> int:
+    """Number of nodes in boxes (n, 4)."""
     return int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum())
-
-
-# least new corner area relative to the old one; the paper has 0, plain convexity
-LEAST_AREA_PART = 0.1
 
 
 class Sweeps:
@@ -436,25 +434,25 @@ class Sweeps:
         start: str = "displacement",
         family="auto",
     ):
-        for word, value, known in (
+        for option, value, choices in (
             ("edge_lengths", edge_lengths, ("conditional", "unit")),
             ("functional", functional, FUNCTIONALS),
             ("start", start, STARTS),
         ):
-            if value not in known:
-                raise BadInput(f"sweeps: {word} '{value}' is none of {', '.join(known)}")
-        self.alone = functional == "ivanenko-charakhchyan"
-        if not (epsilon >= 0.0 and (epsilon > 0.0 or not self.alone)):
+            if value not in choices:
+                raise BadInput(f"sweeps: {option} '{value}' is none of {', '.join(choices)}")
+        self.without_lines = functional == "ivanenko-charakhchyan"
+        if not (epsilon >= 0.0 and (epsilon > 0.0 or not self.without_lines)):
             raise BadInput(f"sweeps: epsilon {epsilon} must not be negative")
         self.epsilon = float(epsilon)
         self.floor = LEAST_AREA_PART
         self.start = start
-        self.conditional = edge_lengths == "conditional" and not self.alone
+        self.conditional = edge_lengths == "conditional" and not self.without_lines
         self.sweeps = int(sweeps)
         self.plain_sweeps = int(plain_sweeps)
         self.tolerance = float(tolerance)
         self.family = family
-        self._blocks: dict[tuple[int, int], _Block] = {}
+        self._works: dict[tuple[int, int], _SweepWork] = {}
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """The grid inside `boundary` (2, ni+1, nj+1; only its sides are read), near `previous`.
@@ -462,22 +460,24 @@ class Sweeps:
         Raises RegridFailure, naming side and nodes, if no start is convex.
         """
         previous, boundary = check_grids(previous, boundary)
-        transposed = self._family_of(boundary) == "j"
+        # in the frame where the lines j = const are the straight family
+        transposed = self._choose_family(boundary) == "j"
         mirrored = (compute_area(previous) < 0.0) != transposed
-        block = self._block(previous.shape, transposed)
-        view = _framed(boundary, transposed, mirrored)
-        old = np.ascontiguousarray(_framed(previous, transposed, mirrored))
+        old = np.ascontiguousarray(_view_framed(previous, transposed, mirrored))
         wanted = old.copy()
-        copy_sides(view, wanted)
-        block.begin(self)
-        if not (compute_area(wanted) > 0.0 and block.move(old, wanted, MOST_BOUNDARY_HALVINGS)):
+        copy_sides(_view_framed(boundary, transposed, mirrored), wanted)
+        work = self._work(previous.shape, transposed)
+        work.begin(self)
+        if not (compute_area(wanted) > 0.0 and work.move(old, wanted, MOST_BOUNDARY_HALVINGS)):
             raise explain_failure(boundary)
+        # and back
         nodes = np.empty(previous.shape)
-        found = block.nodes[::-1] if mirrored else block.nodes
-        nodes[:] = found.transpose(0, 2, 1) if transposed else found
-        return RegridResult(nodes, block.report())
+        upright = work.nodes[::-1] if mirrored else work.nodes
+        nodes[:] = upright.transpose(0, 2, 1) if transposed else upright
+        return RegridResult(nodes, work.report())
 
-    def _family_of(self, boundary) -> str:
+    def _choose_family(self, boundary) -> str:
+        """The family of straight lines: "i" for the lines j = const, or "j"."""
         if self.family in ("i", "j"):
             return self.family
         weights = np.empty(2)
@@ -487,15 +487,16 @@ class Sweeps:
             weights[:] = self.family
         return "j" if weights[1] > weights[0] else "i"
 
-    def _block(self, shape, transposed) -> _Block:
+    def _work(self, shape, transposed) -> _SweepWork:
+        """The arrays for blocks of this shape."""
         ni, nj = shape[1] - 1, shape[2] - 1
-        key = (nj, ni) if transposed else (ni, nj)
-        if key not in self._blocks:
-            self._blocks[key] = _Block(*key)
-        return self._blocks[key]
+        cells = (nj, ni) if transposed else (ni, nj)
+        if cells not in self._works:
+            self._works[cells] = _SweepWork(*cells)
+        return self._works[cells]
 
 
-class _Block:
+class _SweepWork:
     """Arrays of one block in the frame where the lines j = const are the straight family."""
 
     def __init__(self, ni: int, nj: int):
@@ -503,7 +504,7 @@ class _Block:
         shape = (2, ni + 1, nj + 1)
         self.nodes, self.trial, self.direction, self.other_direction = np.zeros((4, *shape))
         self.tau = np.ones(shape[1:])
-        self.laws_i, self.laws_j = np.zeros((4, ni)), np.zeros((4, nj))
+        self.along_i, self.along_j = np.zeros((4, ni)), np.zeros((4, nj))
         self.blends = np.zeros(ni + 1), np.zeros(nj + 1)
         self.kept = np.zeros((ni + 1) * KEPT_LENGTH)
         self.scratch = np.zeros(SWEEP_ROWS)
@@ -511,13 +512,18 @@ class _Block:
         self.workspace: Workspace | None = None
 
     def begin(self, options: Sweeps) -> None:
+        """Take the options of a regrid, and count anew."""
         self.options = options
-        self.sweeps = self.node_sweeps = self.sub_moves = self.rescues = 0
+        self.sweeps = 0
+        self.node_sweeps = 0
+        self.sub_moves = 0
+        self.rescues = 0
         self.ratio = np.inf
         self.residual = 0.0
         self.start = options.start
 
     def report(self) -> RegridReport:
+        """What the regrid took."""
         return RegridReport(
             iterations=self.sweeps,
             node_iterations=self.node_sweeps,
@@ -526,7 +532,7 @@ class _Block:
             least_corner_ratio=float(self.ratio),
             residual=self.residual,
             start=self.start,
-            exempt_corners=self.exempt,
+            exempt_corners=self.exempt_corners,
         )
 
     def move(self, old, wanted, halvings: int) -> bool:
@@ -536,25 +542,27 @@ class _Block:
         if halvings == 0:
             return False
         half = old.copy()
-        for target, a, b in zip(get_sides(half), get_sides(old), get_sides(wanted), strict=True):
-            target[:] = 0.5 * (a + b)
+        for half_side, old_side, wanted_side in zip(
+            get_sides(half), get_sides(old), get_sides(wanted), strict=True
+        ):
+            half_side[:] = 0.5 * (old_side + wanted_side)
         if not self.move(old, half, halvings - 1):
             return False
         self.sub_moves += 1
         middle = self.nodes.copy()
-        # A failure here means that the boundary itself is invalid: few more halves are tried.
         if not self.move(middle, wanted, halvings - 1):
             return False
         self.start = "halved"
         return True
 
     def _advance(self, old, wanted) -> bool:
+        """Move `old` to the sides of `wanted` at once, into `self.nodes`; False if that fails."""
         options = self.options
-        sigma = fill_spacings(wanted, options.conditional, self.laws_i, self.laws_j, *self.blends)
-        self.pull = 0.0 if options.alone else 1.0
-        self.weight = 0.25 * sigma * (1.0 if options.alone else options.epsilon)
+        sigma = fill_spacings(wanted, options.conditional, self.along_i, self.along_j, *self.blends)
+        self.pull = 0.0 if options.without_lines else 1.0
+        self.weight = 0.25 * sigma * (1.0 if options.without_lines else options.epsilon)
         self.floors = fill_floors(old, options.floor)
-        self.exempt = count_turned_corners(wanted)
+        self.exempt_corners = count_turned_corners(wanted)
         if not self._begin_from_convex(old, wanted):
             return False
         if self.ni > 1 and self.nj > 1 and self.weight + self.pull > 0.0:
@@ -573,9 +581,12 @@ class _Block:
             return float(new.min()), float((new / compute_corner_areas(old)[counted]).min())
 
     def _begin_from_convex(self, old, wanted) -> bool:
-        """The chain of starts in two passes, of which the first also requires the floor."""
+        """Begin from the first convex grid of a chain of starts; False where none is convex.
+
+        In two passes, of which the first also requires the floor.
+        """
         grids = {}
-        order = [self.options.start, *(s for s in STARTS if s != self.options.start)]
+        order = [self.options.start, *(start for start in STARTS if start != self.options.start)]
         for strict in (True, False):
             for start in order:
                 if start not in grids:
@@ -594,7 +605,8 @@ class _Block:
             return True
         return False
 
-    def _make_start(self, start, old, wanted):
+    def _make_start(self, start, old, wanted) -> np.ndarray:
+        """A grid on the sides of `wanted`, which may be folded, by its name in STARTS."""
         if start == "displacement":
             return displaced_grid(old, wanted)
         grid = old.copy()
@@ -604,6 +616,7 @@ class _Block:
         return grid
 
     def _untangle(self, old, grid) -> bool:
+        """Unfold `grid` in place, with the barrier's straight lines; True where that succeeds."""
         if min(self.ni, self.nj) < 2:
             return False
         if self.workspace is None:
@@ -617,9 +630,10 @@ class _Block:
         return bool(untangle(work, grid)) and bool(np.isfinite(grid).all())
 
     def _iterate(self, sigma: float) -> None:
+        """Sweeps from the convex `self.nodes`, first on all of them, then on those still active."""
         options = self.options
-        whole = cut_block(self.ni, self.nj)
-        self.boxes = whole
+        all_boxes = cut_block(self.ni, self.nj)
+        self.boxes = all_boxes
         is_whole = True
         # Outside the boxes the trial grid is the grid, before and after every sweep.
         self.trial[:] = self.nodes
@@ -633,103 +647,91 @@ class _Block:
                 if is_whole:
                     return
                 # the subset has converged: check all nodes once more
-                self.boxes = whole
+                self.boxes = all_boxes
                 is_whole = True
                 continue
             self.sweeps += 1
             self.node_sweeps += count_nodes(self.boxes)
-            share = 1.0
-            self._try(share)
+            self._try_step(1.0)
             if sweep >= options.plain_sweeps:
-                share = self._share_by_parabola(total)
-                self._try(share)
+                self._try_step(self._choose_tau_s(total))
             for j0, j1, i0, i1 in self.boxes:
                 self.nodes[:, i0:i1, j0:j1] = self.trial[:, i0:i1, j0:j1]
             if options.tolerance > 0.0:
                 boxes = np.empty((self.nj + 1, 4), dtype=np.int64)
                 count = fill_active_boxes(self.ni, self.nj, self.per_line, self.boxes, boxes)
                 is_whole = count_nodes(boxes[:count]) == inner
-                self.boxes = whole if is_whole else boxes[:count]
+                self.boxes = all_boxes if is_whole else boxes[:count]
 
     def _direct(self, nodes, direction, per_line) -> tuple[float, int]:
         """Fill `direction` in the boxes; returns sum |R|² and the number of active lines."""
         return fill_directions(
-            nodes, (self.laws_i, self.laws_j),
+            nodes, (self.along_i, self.along_j),
             (self.pull, self.weight, self.options.tolerance**2), self.boxes, self.kept,
             self.scratch, direction, per_line,
         )  # fmt: skip
 
-    def _try(self, share: float) -> None:
-        """Trial grid with tau_s = `share`; tau0 halved node by node until it is convex."""
+    def _try_step(self, tau_s: float) -> None:
+        """Trial grid with `tau_s`; tau0 halved node by node until it is convex."""
         if self.halved:
             self.tau[:] = 1.0
         self.halved = False
-        has = None
+        areas_before = None
         for _ in range(MOST_TAU_ROUNDS):
             if try_step(
-                self.nodes, self.direction, self.tau, share, self.boxes, self.floors, self.trial
+                self.nodes, self.direction, self.tau, tau_s, self.boxes, self.floors, self.trial
             ):
                 return
             self.halved = True
-            has = compute_corner_areas(self.nodes) if has is None else has
-            if not halve_taus(compute_corner_areas(self.trial), has, self.floors, self.tau):
+            if areas_before is None:
+                areas_before = compute_corner_areas(self.nodes)
+            areas = compute_corner_areas(self.trial)
+            if not halve_taus(areas, areas_before, self.floors, self.tau):
                 return
         self.trial[:] = self.nodes
 
-    def _share_by_parabola(self, at_zero: float) -> float:
+    def _choose_tau_s(self, at_zero: float) -> float:
         """tau_s at the minimum of the parabola through sum |R|² at 0, ½ and 1; `trial` is at 1."""
         at_one, _ = self._direct(self.trial, self.other_direction, self.other_lines)
-        self._try(0.5)
+        self._try_step(0.5)
         at_half, _ = self._direct(self.trial, self.other_direction, self.other_lines)
-        bend = 2.0 * (at_one + at_zero - 2.0 * at_half)
+        curvature = 2.0 * (at_one + at_zero - 2.0 * at_half)
         slope = 4.0 * at_half - 3.0 * at_zero - at_one
-        if not bend > 0.0:
+        if not curvature > 0.0:
             return 1.0 if at_one < at_half else 0.5
         low, high = PARABOLA_RANGE
-        return min(high, max(low, -0.5 * slope / bend))
+        return min(high, max(low, -0.5 * slope / curvature))
 
 
 @kernel
-def try_step(nodes, direction, tau, share, boxes, floors, trial):
-    """Trial nodes `r + share tau D` in boxes; True if all corners of their cells exceed floors."""
+def try_step(nodes, direction, tau, tau_s, boxes, floors, trial):
+    """Trial nodes `r + tau_s tau D` in boxes; True if all corners of their cells exceed floors."""
+    for b in range(boxes.shape[0]):
+        first_line = boxes[b, 0]
+        stop_line = boxes[b, 1]
+        for k in range(2):
+            for i in range(boxes[b, 2], boxes[b, 3]):
+                # slices, because an index of unknown sign keeps the loop from vectorising
+                row = nodes[k, i, first_line:stop_line]
+                row_direction = direction[k, i, first_line:stop_line]
+                row_trial = trial[k, i, first_line:stop_line]
+                row_tau = tau[i, first_line:stop_line]
+                for col in range(stop_line - first_line):
+                    row_trial[col] = row[col] + tau_s * row_tau[col] * row_direction[col]
+    # corners of the cells in and around the boxes
     failing = 0
     for b in range(boxes.shape[0]):
-        j0 = boxes[b, 0]
-        j1 = boxes[b, 1]
-        i0 = boxes[b, 2]
-        i1 = boxes[b, 3]
-        for k in range(2):
-            for i in range(i0, i1):
-                # slices, because an index of unknown sign keeps the loop from vectorising
-                here = nodes[k, i, j0:j1]
-                step = direction[k, i, j0:j1]
-                new = trial[k, i, j0:j1]
-                part = tau[i, j0:j1]
-                for col in range(j1 - j0):
-                    new[col] = here[col] + share * part[col] * step[col]
-    for b in range(boxes.shape[0]):
-        near = boxes[b, 0] - 1
-        end = boxes[b, 1]
+        first = boxes[b, 0] - 1
+        stop = boxes[b, 1]
         for i in range(boxes[b, 2] - 1, boxes[b, 3]):
-            x0, y0 = trial[0, i, near : end + 1], trial[1, i, near : end + 1]
-            x1, y1 = trial[0, i + 1, near : end + 1], trial[1, i + 1, near : end + 1]
-            least = floors[:, i, near:end]
-            for col in range(end - near):
-                lx = x1[col] - x0[col]
-                ly = y1[col] - y0[col]
-                ux = x1[col + 1] - x0[col + 1]
-                uy = y1[col + 1] - y0[col + 1]
-                ax = x0[col + 1] - x0[col]
-                ay = y0[col + 1] - y0[col]
-                bx = x1[col + 1] - x1[col]
-                by = y1[col + 1] - y1[col]
-                good = (0.5 * (lx * ay - ly * ax) > least[0, col]) & (
-                    0.5 * (ux * ay - uy * ax) > least[1, col]
-                )
-                good &= (0.5 * (ux * by - uy * bx) > least[2, col]) & (
-                    0.5 * (lx * by - ly * bx) > least[3, col]
-                )
-                failing += 0 if good else 1
+            x0, y0 = trial[0, i, first : stop + 1], trial[1, i, first : stop + 1]
+            x1, y1 = trial[0, i + 1, first : stop + 1], trial[1, i + 1, first : stop + 1]
+            least = floors[:, i, first:stop]
+            for col in range(stop - first):
+                area_1, area_2, area_3, area_4 = find_areas(*take_edges(x0, y0, x1, y1, col))
+                is_good = (0.5 * area_1 > least[0, col]) & (0.5 * area_2 > least[1, col])
+                is_good &= (0.5 * area_3 > least[2, col]) & (0.5 * area_4 > least[3, col])
+                failing += 0 if is_good else 1
     return failing == 0
 
 
@@ -744,23 +746,24 @@ def fill_floors(old: np.ndarray, ratio: float) -> np.ndarray:
     return floors
 
 
-def halve_taus(areas, has, floors, tau) -> bool:
+def halve_taus(areas, areas_before, floors, tau) -> bool:
     """Halve `tau` at the nodes of corner triangles (4, n, m) that are too small; True if any are.
 
-    Too small is below the floor and below KEPT_SHARE of the area in `has`, or not positive.
+    Too small is below the floor and below KEPT_AREA_PART of the area before, or not positive.
     """
-    low = ~(areas > floors) & (floors >= 0.0)
-    low &= ~((areas > np.minimum(floors, KEPT_SHARE * has)) & (areas > 0.0))
-    if not low.any():
+    too_small = ~(areas > floors) & (floors >= 0.0)
+    too_small &= ~((areas > np.minimum(floors, KEPT_AREA_PART * areas_before)) & (areas > 0.0))
+    if not too_small.any():
         return False
     marked = np.zeros(tau.shape, dtype=bool)
-    for triangle, wrong in zip(TRIANGLES, low, strict=True):
+    for triangle, cells in zip(TRIANGLES, too_small, strict=True):
         for i, j in triangle:
-            marked[i : i + wrong.shape[0], j : j + wrong.shape[1]] |= wrong
+            marked[i : i + cells.shape[0], j : j + cells.shape[1]] |= cells
     tau[marked] = np.where(tau[marked] > LEAST_SWEEP_TAU, 0.5 * tau[marked], 0.0)
     return True
 
 
-def _framed(nodes, transposed: bool, mirrored: bool):
+def _view_framed(nodes, transposed: bool, mirrored: bool) -> np.ndarray:
+    """A view of a grid with i and j exchanged, and x and y, as wanted."""
     view = nodes.transpose(0, 2, 1) if transposed else nodes
     return view[::-1] if mirrored else view

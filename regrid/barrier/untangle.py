@@ -51,6 +51,17 @@ from shockgrid.regrid.jit import inlined, kernel
 from shockgrid.regrid.measure.quality import take_edges
 from shockgrid.regrid.sides import copy_sides
 
+FIRST_SPREAD_PART = 0.2  # e of the first step, over the worst D
+LEAST_SPREAD = 1e-6  # of e where the grid needs no long way to unfold
+LEAST_FREE_SPREAD = 1e-10  # of e where nothing near is known of the grid (R5.4)
+LEAST_GAIN = 0.1  # of the energy in a step, in the formula for e (R5.2)
+UNTANGLING_ITERATIONS = 16  # of the linear solve of a step of (R5.2)
+FREE_ITERATIONS = 200  # of one of (R5.4)
+# steps of (R5.4) at one e, which end when a step gains less
+ROUND_STEPS = 8
+ROUND_GAIN = 0.02
+MOST_STEP_HALVINGS_AT_SPREAD = 12
+WIDE_SPREAD_FACTOR = 10.0  # e over the worst D of a nearly harmonic map
 # Scratch behind that of the assembly: values and D of the corners, and sums of the columns.
 VALUE_1, VALUE_2, VALUE_3, VALUE_4 = (ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4))
 AREA_1, AREA_2, AREA_3, AREA_4 = (ASSEMBLY_ROWS + k * CHUNK_SPAN for k in range(4, 8))
@@ -168,19 +179,6 @@ def fill_energy(nodes, inputs, spread, barrier, first, last, Z):
             add_cell_values(nodes, i, inputs, first, cells, Z)
 
 
-FIRST_SPREAD_PART = 0.2  # e of the first step, over the worst D
-LEAST_SPREAD = 1e-6  # of e where the grid needs no long way to unfold
-LEAST_FREE_SPREAD = 1e-10  # of e where nothing near is known of the grid (R5.4)
-LEAST_GAIN = 0.1  # of the energy in a step, in the formula for e (R5.2)
-UNTANGLING_ITERATIONS = 16  # of the linear solve of a step of (R5.2)
-FREE_ITERATIONS = 200  # of one of (R5.4)
-# steps of (R5.4) at one e, which end when a step gains less
-ROUND_STEPS = 8
-ROUND_GAIN = 0.02
-MOST_STEP_HALVINGS_AT_SPREAD = 12
-WIDE_SPREAD_FACTOR = 10.0  # e over the worst D of a nearly harmonic map
-
-
 class SolveLimits(NamedTuple):
     """When the linear solve of a step ends: at a part of its first residual, or its iterations."""
 
@@ -241,7 +239,7 @@ def unfold(work, nodes, tuning: Tuning, unfolding: Unfolding) -> bool:
     limits = SolveLimits(tuning.exact_tolerance, FREE_ITERATIONS)
     # a nearly harmonic map at first
     if unfolding in (Unfolding.GRADED_SPREAD, Unfolding.EVEN_SPREAD):
-        spread = WIDE_SPREAD_FACTOR * max(1.0, -work.compute_energy(nodes, 1.0)[1])
+        spread = WIDE_SPREAD_FACTOR * max(1.0, -work.compute_least_area(nodes))
         energy = work.compute_energy(nodes, spread)[0]
         for _ in range(ROUND_STEPS):
             energy = _step(work, nodes, spread, energy, limits).energy
@@ -290,7 +288,7 @@ def _lower_spread(
     work, nodes, round_steps: int, least_spread: float, most_steps: int, limits: SolveLimits
 ) -> float | None:
     """Steps at falling e until `nodes` has no fold: the last e, or None where one stays."""
-    least_area = work.compute_energy(nodes, 1.0)[1]
+    least_area = work.compute_least_area(nodes)
     if not np.isfinite(least_area):
         return None
     spread = float(np.hypot(least_spread, FIRST_SPREAD_PART * min(least_area, 0.0)))

@@ -327,23 +327,41 @@ class Workspace:
             if share_i + share_j > 0.0:
                 fill_curves(self.sides, share_i, share_j, self.curve)
                 epsilon = max(epsilon, least_epsilon)
+        keeps_spacing, shares_i, shares_j, ease = self._take_shares()
         inputs = BarrierInputs(
-            *tuning.get_weights(epsilon, 1.0, cost), self.along_i, self.along_j, self.blend_i,
-            self.blend_j, self.departs, self.spacing_departure, self.most_departure, self.chords,
-            *self._take_shares(), self.curve, share_i + share_j > 0.0, float(ki), float(kj), 0.0,
-            0.0, self.sound, 0.0,
-        )  # fmt: skip
+            *tuning.get_weights(epsilon, 1.0, cost),
+            along_i=self.along_i,
+            along_j=self.along_j,
+            blend_i=self.blend_i,
+            blend_j=self.blend_j,
+            departs=self.departs,
+            spacing_departure=self.spacing_departure,
+            most_departure=self.most_departure,
+            chords=self.chords,
+            keeps_spacing=keeps_spacing,
+            shares_i=shares_i,
+            shares_j=shares_j,
+            ease=ease,
+            curve=self.curve,
+            curved=share_i + share_j > 0.0,
+            ki=float(ki),
+            kj=float(kj),
+            sigma=0.0,
+            area_target=0.0,
+            sound=self.sound,
+            cost_scale=0.0,
+        )
         # all that follows from the sides alone
         self.symmetry = None
         self.motion = SideMotion(self.sides, *self.motion_tables)
-        self.block = prepare.entry(
+        self.side_numbers = prepare.entry(
             self.old, inputs, self.motion, conditional,
             (float(tuning.cost_margin), float(self.least_limiting_rate)),
             self.boundary_check.scratch,
         )  # fmt: skip
-        self.sigma = self.block.sigma
-        self.area_target = self.block.area_target
-        cost_scale = self.block.cost_scale
+        self.sigma = self.side_numbers.sigma
+        self.area_target = self.side_numbers.area_target
+        cost_scale = self.side_numbers.cost_scale
         # the spacing that is kept instead
         if self.spacing is not None:
             sides = SideLengths(self.along_i, self.along_j, self.blend_i, self.blend_j)
@@ -367,9 +385,8 @@ class Workspace:
     def is_simple(self) -> bool:
         """Whether the sides enclose an area without crossing or touching, apart from detected cuts
         (`find_cut_edges`)."""
-        return self.block.area > 0.0 and self.boundary_check.is_clear(
-            self.block.meeting, self.sides
-        )
+        numbers = self.side_numbers
+        return numbers.area > 0.0 and self.boundary_check.is_clear(numbers.meeting, self.sides)
 
     def keep_departure(self, spacing_departure: np.ndarray) -> None:
         """Keep the spacing that each line j = const has, by its departure (ni+1, nj+1) from the
@@ -541,3 +558,7 @@ class Workspace:
             energy += float(rows[ENERGY_ROW : ENERGY_ROW + count].sum())
             least = min(least, float(rows[LEAST_AREA_ROW : LEAST_AREA_ROW + count].min()))
         return energy, least
+
+    def compute_least_area(self, nodes) -> float:
+        """Least scaled corner area D of a grid, which may be folded."""
+        return self.compute_energy(nodes, 1.0)[1]

@@ -23,14 +23,17 @@ from shockgrid.regrid.jit import kernel
 THINNEST_CELL_PART = 0.02  # of the mean size of a block's cells at first: thinner necks are cut
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
+# of the way to the next node inwards: through a film it is no further in front of the other side
+MOST_FRONT_PART = 0.1
 
 
 @kernel
-def find_thinnest(outlines, sizes, most):
+def find_thinnest(outlines, inner, sizes, most):
     """The node at which a body is thinnest by its size: (node, its width over its size).
 
-    sizes (N,): of the cells of the block that each node belongs to [m].  Widths above `most` sizes
-    are not looked for: (NO_FACE, most) where there is none below.
+    inner (2, N): the next nodes inwards; sizes (N,): of the cells of the block that each node
+    belongs to [m].  Widths above `most` sizes are not looked for: (NO_FACE, most) where there is
+    none below.
     """
     nodes = outlines.nodes
     boxes = outlines.boxes
@@ -64,6 +67,11 @@ def find_thinnest(outlines, sizes, most):
                     continue
                 if find_depth(nodes, start, x, y) < 0.0:
                     continue
+                # not two ends of one body that touch each other: the inside is in front then
+                to_x, to_y = inner[0, node] - x, inner[1, node] - y
+                front = -find_depth(nodes, start, inner[0, node], inner[1, node])
+                if front > MOST_FRONT_PART * (to_x * to_x + to_y * to_y) ** 0.5:
+                    continue
                 thinnest = away**0.5 / size
                 reach = thinnest * size
                 at = node
@@ -80,19 +88,29 @@ class Necks:
         self.bodies = bodies
         sizes = [np.full(s.count + 1, s.measure_cell() ** 0.5) for s in bodies.surfaces]
         self.sizes = np.concatenate(sizes or [np.zeros(0)])
-        bodies.read()
+        self.inner = np.zeros_like(bodies.outlines.nodes)
+        self._read()
         self._first_nodes = bodies.outlines.nodes.copy()
+        self._first_inner = self.inner.copy()
         self._least_part: float | None = None
+
+    def _read(self) -> None:
+        """Take up the present nodes, and those next to them inwards."""
+        self.bodies.read()
+        for surface, span in zip(self.bodies.surfaces, self.bodies.spans, strict=True):
+            inner = np.empty((2, surface.count + 1))
+            surface.fill_inner(inner)
+            self.inner[:, span] = inner
 
     def find_cut(self) -> str | None:
         """A sentence about the place where a body is cut now, or None."""
         outlines = self.bodies.outlines
         if self._least_part is None:
             outlines.nodes[...] = self._first_nodes
-            _, first = find_thinnest.entry(outlines, self.sizes, 1.0)
+            _, first = find_thinnest.entry(outlines, self._first_inner, self.sizes, 1.0)
             self._least_part = min(THINNEST_CELL_PART, THINNEST_FIRST_PART * float(first))
-        self.bodies.read()
-        node, _ = find_thinnest.entry(outlines, self.sizes, self._least_part)
+        self._read()
+        node, _ = find_thinnest.entry(outlines, self.inner, self.sizes, self._least_part)
         if node == NO_FACE:
             return None
         surface = self.bodies.find_surface(int(node))

@@ -299,8 +299,11 @@ class Bodies:
         number = next(n for n, span in enumerate(self.spans) if span.start <= node < span.stop)
         return self.surfaces[number]
 
-    def push_apart(self) -> int:
-        """Push apart what lies too deep, in the new nodes of all blocks; how many nodes moved."""
+    def push_apart(self, longest_way: float) -> int:
+        """Push apart what lies too deep, in the new nodes of all blocks; how many nodes moved.
+
+        longest_way [m]: no node goes further: a jump in a short step would crush its cells.
+        """
         outlines = self.outlines
         for surface, span in zip(self.surfaces, self.spans, strict=True):
             surface.read_new()
@@ -309,6 +312,10 @@ class Bodies:
         moved = int(push_apart.entry(outlines, self.numbers))
         if moved == 0:
             return 0
+        ways = outlines.nodes - self.before
+        lengths = np.hypot(*ways)
+        ways *= np.where(lengths > longest_way, longest_way / np.maximum(lengths, 1e-300), 1.0)
+        np.add(self.before, ways, out=outlines.nodes)
         for surface, span in zip(self.surfaces, self.spans, strict=True):
             if not surface.rigid:
                 surface.new[...] = outlines.nodes[:, span]

@@ -100,7 +100,11 @@ class Surface:
         self.line[...] = self.segment.line(self.block.nodes)[:, :: self.step]
         fill_boxes(self.line, self.group, self.nodes.boxes)
         self.longest = fill_squares(self.line, self.arrays.squares)
-        fill_inner(self.block.nodes, self.side, self.segment.start, self.back, self.inner)
+        self.fill_inner(self.inner)
+
+    def fill_inner(self, inner: np.ndarray) -> None:
+        """Fill the next nodes inwards (2, n + 1) of the present ones."""
+        fill_inner(self.block.nodes, self.side, self.segment.start, self.back, inner)
 
     def read_new(self) -> None:
         """Take up the new nodes."""

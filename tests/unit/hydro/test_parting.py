@@ -25,14 +25,14 @@ def make_boxes(*corners, apart=0.0):
     return bodies
 
 
-def push_apart(*shifts):
+def push_apart(*shifts, longest_way=np.inf):
     """Boxes that were shifted in a step; the grids after they are pushed apart, how many nodes."""
     bodies = make_boxes((0.0, 0.0), (0.0, 0.0), apart=1.0)
     simulation = Simulation(bodies, [], t_end=1.0)
     for body, shift in zip(bodies, shifts, strict=True):
         body.nodes_new[...] = body.nodes - body.nodes[:, :1, :1]
         body.nodes_new += np.reshape(shift, (2, 1, 1))
-    moved = simulation.meetings.bodies.push_apart()
+    moved = simulation.meetings.bodies.push_apart(longest_way)
     return [body.nodes_new for body in bodies], moved
 
 
@@ -71,6 +71,20 @@ def test_no_node_stays_deep_in_another_body(shift):
     assert np.abs(middle - 0.5 * (1.0 + np.array(shift))).max() < 0.01
 
 
+@pytest.mark.parametrize("longest_way", [1e-9, 1e-3])
+def test_no_node_goes_further_than_it_may(longest_way):
+    """A jump in a short step would crush cells: what is left goes in the steps that follow."""
+    shift = 0.97, 0.97
+    grids, moved = push_apart((0.0, 0.0), shift, longest_way=longest_way)
+    assert moved > 0
+    untouched = box((0.0, 0.0), (1.0, 1.0), (10, 10))
+    ways = [
+        np.hypot(*(grid - untouched - np.reshape(start, (2, 1, 1))))
+        for grid, start in zip(grids, ((0.0, 0.0), shift), strict=True)
+    ]
+    assert max(way.max() for way in ways) == pytest.approx(longest_way, rel=1e-6)
+
+
 def test_bodies_that_are_apart_keep_their_nodes():
     grids, moved = push_apart((0.0, 0.0), (1.0, 0.3))
     assert moved == 0
@@ -97,3 +111,19 @@ def test_a_neck_is_cut_below_a_part_of_a_cell(width):
     cut = necks.find_cut()
     assert (cut is None) == (width > 1.0)
     assert cut is None or ("body0" in cut and "x = 0.5" in cut)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-9, -1e-9])
+def test_ends_of_a_body_that_touch_are_no_neck(gap):
+    """A strip bent to a ring: what is between its two ends is not the body."""
+    radius = np.linspace(1.0, 1.4, 5)
+    angle = np.linspace(gap - np.pi, np.pi - gap, 41)[::-1, None]
+    strip = make_body("strip", "Cu", np.array([radius * np.cos(angle), radius * np.sin(angle)]))
+    (other,) = make_boxes((9.0, 9.0))
+    for body in (strip, other):
+        if not body.segments:
+            free(body, *SIDES)
+    simulation = Simulation([strip, other], [], t_end=1.0)
+    necks = Necks(simulation.meetings.bodies)
+    necks._least_part = THINNEST_CELL_PART
+    assert necks.find_cut() is None

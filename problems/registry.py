@@ -30,6 +30,13 @@ SUBJECTS: dict[str, dict[str, str]] = {
         "conical-target": "shockgrid.problems.conical_target.problem:ConicalTarget",
         "detonation": "shockgrid.problems.standard.detonation:Detonation",
     },
+    "solids with strength": {
+        "elastic-piston": "shockgrid.problems.standard.elastic_piston:ElasticPiston",
+        "taylor-bar": "shockgrid.problems.standard.taylor_bar:TaylorBar",
+        "shell": "shockgrid.problems.standard.shell:CollapsingShell",
+        "rippled-surface": "shockgrid.problems.standard.rippled_surface:RippledSurface",
+        "flying-plate": "shockgrid.problems.standard.flying_plate:FlyingPlate",
+    },
     "verification against exact solutions": {
         "riemann": "shockgrid.problems.riemann:Riemann",
         "free-stream": "shockgrid.problems.standard.free_stream:FreeStream",

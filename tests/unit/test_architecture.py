@@ -60,7 +60,7 @@ ROOMS = (
     ("problems.problem_file", "problems.own_simulation"),
     ("problems.registry", "problems.grid_march"),
     ("problems.references",),
-    ("problems.initial_states",),
+    ("problems.initial_states", "problems.solids"),
     ("problems.interface_instability", "problems.plate_on_wedge", "problems.conical_target",
      "problems.shock_bubble", "problems.riemann", "problems.blocks", "problems.standard",
      "problems.convection"),

@@ -7,7 +7,7 @@ swaps them.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,14 @@ from shockgrid.hydro.eos.base import check_eos, check_formulas
 from shockgrid.hydro.eos.conversion import compute_energy, compute_temperature
 from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry, compute_volumes
-from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, limit_gently, limit_van_leer
-from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
+from shockgrid.hydro.formulas.reconstruction import (
+    DEFAULT_LIMITER,
+    FIRST_ORDER_LIMITER,
+    LIMITERS,
+    limit_gently,
+    limit_van_leer,
+)
+from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX, HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior.advance import count_tiles
 from shockgrid.hydro.interior.cell_fields import (
     SLAB_ROWS,
@@ -54,19 +60,28 @@ LONG_NAMES = {
 }
 
 
-def _check_name(name: object, what: str, other: str = "/,") -> None:
-    """Raise BadInput for a name invalid in dumps and histories; `other`: forbidden characters."""
+def _check_name(name: object, what: str, forbidden: str = "/,") -> None:
+    """Raise BadInput for a name invalid in dumps and histories, or with `forbidden` characters."""
     if not isinstance(name, str):
         raise BadInput(f"{what} is called {name!r}: a name is text")
-    if not name.strip() or name == "." or not name.isprintable() or set(name) & set(other):
-        signs = " or ".join(other)
+    if not name.strip() or name == "." or not name.isprintable() or set(name) & set(forbidden):
+        signs = " or ".join(forbidden)
         raise BadInput(f"{what} is called {name!r}: a name has one sign at least, and no {signs}")
 
 
-def _read_nodes(name: str, given: Any) -> np.ndarray:
+def _check_choice(name: str, what: str, choice: object, choices: Collection[str]) -> None:
+    """Raise BadInput where a block's limiter or flux is none of the `choices`."""
+    if not isinstance(choice, str) or choice not in choices:
+        hint = suggest(choice, choices) if isinstance(choice, str) else ""
+        raise BadInput(
+            f"block {name!r}: there is no {what} {choice!r}{hint}; there are: {', '.join(choices)}"
+        )
+
+
+def _read_nodes(name: str, nodes: Any) -> np.ndarray:
     """The nodes (2, ni + 1, nj + 1) of a new block; raises BadInput where they make no grid."""
     try:
-        nodes = np.array(given, dtype=np.float64, order="C")
+        nodes = np.array(nodes, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise BadInput(f"block {name!r}: its nodes are not an array of numbers ({error})") from None
     if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 3:
@@ -74,12 +89,12 @@ def _read_nodes(name: str, given: Any) -> np.ndarray:
             f"block {name!r}: nodes have shape {nodes.shape}; "
             "they must be (2, ni + 1, nj + 1) with at least 2 cells each way"
         )
-    bad = find_bad_cells(nodes)
-    if len(bad):
-        i, j = (int(index) for index in bad[0])
+    bad_cells = find_bad_cells(nodes)
+    if len(bad_cells):
+        i, j = (int(index) for index in bad_cells[0])
         raise BadInput(
-            f"block {name!r}: {len(bad)} cells of the first grid are not convex or are turned "
-            f"over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
+            f"block {name!r}: {len(bad_cells)} cells of the first grid are not convex or are "
+            f"turned over (the first is cell i={i}, j={j}); i and j must turn counter-clockwise"
         )
     return nodes
 
@@ -126,8 +141,10 @@ class Block:
         strength: StrengthLaw | None = None,
     ):
         _check_name(name, "a block")
-        _check_name(material or name, f"the material of block {name!r}", other=",")
+        _check_name(material or name, f"the material of block {name!r}", forbidden=",")
         check_eos(name, eos)
+        _check_choice(name, "limiter", limiter, (*LIMITERS, FIRST_ORDER_LIMITER))
+        _check_choice(name, "flux", flux, HLL_JUMP_THRESHOLDS)
         self.name = name
         self.material = material or name
         self.eos = eos
@@ -158,7 +175,7 @@ class Block:
             self.stress = Stress(strength, self.ni, self.nj)
         self._carry(carried)
         self.mixed = self._mix(eos, limiter, flux) if isinstance(eos, Mixture) else None
-        self._starts: dict[str, np.ndarray] = {}  # separate if a body source acts
+        self._start_copies: dict[str, np.ndarray] = {}  # separate if a body source acts
         # the equation of state's numbers, of the types for which kernels are compiled, as those of
         # a user's own need not be
         self.parameters = _read_parameters(eos)
@@ -182,9 +199,9 @@ class Block:
         self.segments: list[Any] = []  # `hydro.boundary.put` adds them
         self.set_geometry(PLANE)
 
-    def _read_state(self, given: Mapping[str, Any]) -> None:
+    def _read_state(self, values_by_name: Mapping[str, Any]) -> None:
         """Fill the first state with numbers, arrays (ni, nj) or functions of the cells' centres."""
-        for row, (label, value) in enumerate(given.items()):
+        for row, (label, value) in enumerate(values_by_name.items()):
             value = value(*self.centres) if callable(value) else value
             try:
                 self.state[row, 1:-1, 1:-1] = value
@@ -198,9 +215,9 @@ class Block:
                     f"the block has {self.ni} x {self.nj} cells"
                 ) from None
 
-    def _carry(self, given: Sequence[CarriedField]) -> None:
+    def _carry(self, fields_given: Sequence[CarriedField]) -> None:
         """Give the cells carried fields, and name what they hold (`HELD_ARRAYS` and these)."""
-        self.carried_fields = fields = read_fields(self.name, given)
+        self.carried_fields = fields = read_fields(self.name, fields_given)
         self.carried = np.zeros((len(fields), self.ni + 2, self.nj + 2))
         self.carried_new = np.zeros(self.carried.shape)
         for number, field in enumerate(fields):
@@ -317,20 +334,22 @@ class Block:
 
     def get_start(self, name: str) -> np.ndarray:
         """One of `held_arrays` as a step starts from it: the present one, or a source's copy."""
-        return self._starts.get(name, getattr(self, name))
+        return self._start_copies.get(name, getattr(self, name))
 
     @property
     def start(self) -> np.ndarray:
         """The state (4, ni + 2, nj + 2) that a step starts from."""
         return self.get_start("state")
 
-    def part_start(self, apart: bool) -> None:
+    def use_start_copies(self, wanted: bool) -> None:
         """Set whether steps start from copies of what cells hold, which a source may modify."""
-        self._starts = {name: getattr(self, name).copy() for name in self.held_arrays if apart}
+        self._start_copies = {
+            name: getattr(self, name).copy() for name in self.held_arrays if wanted
+        }
 
     def copy_start(self) -> None:
         """Let the next step start from the present state, where it starts from copies."""
-        for name, copy in self._starts.items():
+        for name, copy in self._start_copies.items():
             copy[...] = getattr(self, name)
 
     @property
@@ -350,10 +369,10 @@ class Block:
         rho, _, _, p = self.state_new[:, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             c = self.eos.with_fields(self.carried_new[:, 1:-1, 1:-1]).sound_speed(rho, p)
-        bad = ~((rho > 0.0) & (c > 0.0))
-        if not bad.any():
+        is_bad = ~((rho > 0.0) & (c > 0.0))
+        if not is_bad.any():
             return self._find_failed_totals()
-        i, j = (int(index) for index in np.argwhere(bad)[0])
+        i, j = (int(index) for index in np.argwhere(is_bad)[0])
         rho, p = self.state_new[[RHO, P], i + 1, j + 1]
         known = f", its pressure {p:.6g} Pa" if np.isfinite(p) else ""
         return RunFailure(
@@ -365,18 +384,18 @@ class Block:
 
     def _find_failed_totals(self) -> RunFailure | None:
         """Why the totals of the new state are none though every cell has a state, or None."""
-        lost = self.totals.find_lost()
-        if lost:
+        lost_totals = self.totals.find_lost()
+        if lost_totals:
             return RunFailure(
-                f"flow: block {self.name!r}: its {' and '.join(lost)} cannot be summed to a finite "
-                "number, though the state of every cell is one",
+                f"flow: block {self.name!r}: its {' and '.join(lost_totals)} cannot be summed to a "
+                "finite number, though the state of every cell is one",
                 cause=self.eos.failure_cause,
                 place=Place(self.name),
             )
         if self.redistributed_cells:
             return None  # the failed cells have been redistributed since
-        flat = find_bad_cells(self.nodes_new)
-        cell = (int(flat[0, 0]), int(flat[0, 1])) if len(flat) else None
+        flat_cells = find_bad_cells(self.nodes_new)
+        cell = (int(flat_cells[0, 0]), int(flat_cells[0, 1])) if len(flat_cells) else None
         where = f"cell i={cell[0]}, j={cell[1]}" if cell else "a cell"
         return RunFailure(
             f"flow: block {self.name!r}: the area of {where} is lost to round-off in the step",
@@ -406,10 +425,10 @@ class Block:
 
     def _compute_in_own_rows(self, compute: Callable[..., np.ndarray]) -> np.ndarray:
         """What `compute` finds of the cells (ni, nj) of this process, 0 in the others."""
-        found = np.zeros((self.ni, self.nj))
+        values = np.zeros((self.ni, self.nj))
         rows = slice(0, self.ni) if self.is_here else slice(self.rows.start, self.rows.stop)
-        self._fill(found, rows, self.state, compute)
-        return found
+        self._fill(values, rows, self.state, compute)
+        return values
 
     def _list_carried(self) -> dict[str, np.ndarray]:
         """Views (ni, nj) of the carried fields by name."""
@@ -424,18 +443,18 @@ class Block:
         return {"rho": rho, "u": u, "v": v, "p": p, "e": e}
 
     def _fill(
-        self, found: np.ndarray, rows: slice, state: np.ndarray, compute: Callable[..., np.ndarray]
+        self, values: np.ndarray, rows: slice, state: np.ndarray, compute: Callable[..., np.ndarray]
     ) -> None:
         """Fill these rows of an array (ni, nj) with what `compute` finds of a state.
 
         A few rows at a time, so that intermediate arrays fit into the cache.
         """
         inside = state[:, 1:-1, 1:-1]
-        others = [self.get_inside(name) for name in HELD_ARRAYS if name != "state"]
+        void_arrays = [self.get_inside(name) for name in HELD_ARRAYS if name != "state"]
         for first in range(rows.start, rows.stop, SLAB_ROWS):
             slab = slice(first, min(first + SLAB_ROWS, rows.stop))
             eos = self.eos.with_fields(self.carried[:, 1:-1, 1:-1][:, slab])
-            found[slab] = compute(eos, inside[:, slab], *(held[slab] for held in others))
+            values[slab] = compute(eos, inside[:, slab], *(held[slab] for held in void_arrays))
 
     def compute_at(self, name: str, i: np.ndarray, j: np.ndarray) -> np.ndarray:
         """Specific internal energies "e" [J/kg], temperatures "T" [K] of the cells [i, j]."""

@@ -57,12 +57,21 @@ class Segment:
 
     kind: ClassVar[str]
     motion: NodeMotion = NodeMotion.SLIDE
-    ends_flow: ClassVar[bool] = False  # do its ends go with the fluid where nothing else rules?
+    ends_flow: ClassVar[bool] = False  # its ends go with the fluid where nothing else rules them
     linked: ClassVar[bool] = False
     wall: ClassVar[int | None] = None  # a kind of wall, of `hydro.perimeter.contacts`
     beyond: ClassVar[int | None] = None  # of open sides: first row of the state beyond, in rims
     tension: float = 0.0  # surface tension of its line [N/m]
     has_own_line: bool = True  # not so for followers, whose line the leader gives
+    # what other parts of the flow ask of a kind, rather than its name
+    is_free: ClassVar[bool] = False  # nothing lies beyond but a pressure
+    is_thick: ClassVar[bool] = False  # its line is smoothed over a thickness (theory F6.3)
+    is_sliding: ClassVar[bool] = False  # a side of a sliding contact
+    passes_mass: ClassVar[bool] = False  # material goes through it to its partner
+    is_shifted: ClassVar[bool] = False  # its partner's nodes lie a shift away
+    is_inner_seam: ClassVar[bool] = False  # the blocks of a body touch at it
+    meets_bodies: ClassVar[bool] = False  # surfaces of other bodies may touch it
+    is_rigid: ClassVar[bool] = False  # it moves as it does whatever presses on it
 
     def __init__(self, block: Block, side: str, start: int, stop: int):
         self.block = block
@@ -87,17 +96,17 @@ class Segment:
 
     @property
     def follows_flow(self) -> bool:
-        """Do the nodes go with the material, on a line of their own or on a leader's?"""
+        """Whether the nodes go with the material, on a line of their own or on a leader's."""
         return self.motion in (NodeMotion.FLOW, NodeMotion.FOLLOW)
 
     @property
     def is_follower(self) -> bool:
-        """Are the nodes laid on the leader's line of a sliding contact?"""
+        """Whether the nodes are laid on the leader's line of a sliding contact."""
         return self.motion is NodeMotion.FOLLOW
 
     @property
     def moves(self) -> bool:
-        """Do the nodes move by themselves, and not only with the ends of their line?"""
+        """Whether the nodes move by themselves, and not only with the ends of their line."""
         return self.follows_flow or self.motion is NodeMotion.GIVEN
 
     def check_tension(self, tension: Any) -> float:
@@ -141,7 +150,7 @@ class Segment:
         return 0.0, 0.0
 
     def has(self, phase: str) -> bool:
-        """Does the kind fill its ghosts, speeds or fluxes itself?"""
+        """Whether the kind fills its ghosts, speeds or fluxes itself."""
         return getattr(type(self), phase) is not getattr(Segment, phase)
 
     def fill_ghosts(self, t: float) -> None:
@@ -159,6 +168,8 @@ class Wall(Segment):
 
     kind = "wall"
     wall = WALL
+    meets_bodies = True
+    is_rigid = True
 
 
 class Axis(Wall):
@@ -169,6 +180,7 @@ class Axis(Wall):
 
     kind = "axis"
     wall = AXIS
+    meets_bodies = False
 
     def __init__(self, block, side, start, stop):
         super().__init__(block, side, start, stop)
@@ -193,12 +205,12 @@ class Piston(Wall):
         self.check_numbers(self._velocity(0.0), ("u", "v"), "velocity")
 
     def velocity(self, t):
-        given = self._velocity(t)
+        velocity = self._velocity(t)
         try:
-            speed_x, speed_y = given
+            speed_x, speed_y = velocity
             return float(speed_x), float(speed_y)
         except (TypeError, ValueError):
-            self.check_numbers(given, ("u", "v"), "velocity")
+            self.check_numbers(velocity, ("u", "v"), "velocity")
             raise
 
 
@@ -288,6 +300,8 @@ class FreeSurface(Segment):
 
     kind = "free-surface"
     motion = NodeMotion.FLOW
+    is_free = True
+    meets_bodies = True
 
     def __init__(
         self, block, side, start, stop, pressure=0.0, tension=0.0, bond=0.0, friction=0.0,
@@ -360,7 +374,8 @@ class Linked(Segment):
     """
 
     linked = True
-    sticks: bool = False  # do solids on both sides share what acts along the line?
+    sticks: bool = False  # solids on both sides share what acts along the line
+    bonded: bool = False  # solids of two blocks stick together at it
 
 
 class Interface(Linked):
@@ -372,6 +387,7 @@ class Interface(Linked):
 
     kind = "interface"
     motion = NodeMotion.FLOW
+    is_thick = True
 
     def __init__(self, block, side, start, stop, tension=0.0, bonded=False):
         super().__init__(block, side, start, stop)
@@ -389,6 +405,7 @@ class Sliding(Linked):
 
     kind = "sliding"
     motion = NodeMotion.FLOW
+    is_sliding = True
 
     def fill_ghosts(self, t):
         fill_ghosts_from_faces(self.block.rim.rows, self.spans)
@@ -401,6 +418,8 @@ class Seam(Linked):
     motion = NodeMotion.JOIN
     ends_flow = True
     sticks = True
+    passes_mass = True
+    is_inner_seam = True
 
 
 class Periodic(Seam):
@@ -408,6 +427,8 @@ class Periodic(Seam):
 
     kind = "periodic"
     ends_flow = False
+    is_shifted = True
+    is_inner_seam = False
 
 
 OWN_SEGMENTS: dict[str, type[Segment]] = {

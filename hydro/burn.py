@@ -126,11 +126,11 @@ class ProgrammedBurn:
         """Timed burn fraction, 0 to 1, at the points x, y [m] at time t [s]."""
         x, y = x - self.origin[0], y - self.origin[1]
         if self.direction is None:
-            way = np.hypot(x, y)
+            distance = np.hypot(x, y)
         else:
-            way = x * self.direction[0] + y * self.direction[1]
+            distance = x * self.direction[0] + y * self.direction[1]
         edge = speed * t + FRONT_LEAD_FRACTION * self.width
-        return 1.0 - (1.0 - np.clip((edge - way) / self.width, 0.0, 1.0)) ** 2
+        return 1.0 - (1.0 - np.clip((edge - distance) / self.width, 0.0, 1.0)) ** 2
 
     def __call__(self, block, x, y, t, dt):
         eos = block.eos

@@ -91,7 +91,7 @@ def scan_rates(rates, crowding, most_crowded):
 
     Cells of more than `most_crowded` count with the rate that they would have at that crowding.
     """
-    most = -1.0
+    largest = -1.0
     bulk = -1.0
     at_i = 0
     at_j = 0
@@ -99,15 +99,15 @@ def scan_rates(rates, crowding, most_crowded):
         for j in range(rates.shape[1]):
             rate = rates[i, j]
             if rate > bulk:
-                if rate > most:
-                    most = rate
+                if rate > largest:
+                    largest = rate
                     at_i = i
                     at_j = j
                 square = crowding[i, j]
                 if square > most_crowded:
                     rate *= (most_crowded / square) ** 0.5
                 bulk = rate if rate > bulk else bulk
-    return most, at_i, at_j, bulk
+    return largest, at_i, at_j, bulk
 
 
 @kernel
@@ -121,14 +121,14 @@ def find_fastest_cell(rates, row):
         here = rates[i]
         for j in range(row.shape[0]):
             row[j] = here[j] if here[j] > row[j] else row[j]
-    most = -1.0
+    largest = -1.0
     for j in range(row.shape[0]):
-        most = row[j] if row[j] > most else most
+        largest = row[j] if row[j] > largest else largest
     for i in range(rates.shape[0]):
         for j in range(row.shape[0]):
-            if row[j] == most and rates[i, j] == most:
-                return most, i, j
-    return most, 0, 0
+            if row[j] == largest and rates[i, j] == largest:
+                return largest, i, j
+    return largest, 0, 0
 
 
 @kernel
@@ -147,17 +147,17 @@ def is_squeezed(crowding, i, j, share, far_out):
 
 
 @kernel
-def scan_state(totals, sums, rates, crowding, part, counts, kept):
-    """`scan_rates` of a new state with at most `part` of its cells squeezed; then its validity.
+def scan_state(totals, sums, rates, crowding, share, counts, members):
+    """`scan_rates` of a new state with at most `share` of its cells squeezed; then its validity.
 
     Validity is the result of `sum_tiles` on its `totals`, which fills `sums`.
     """
     valid = sum_tiles(totals, sums)
-    most, i, j = find_fastest_cell(rates, kept[: rates.shape[1]])
-    if part > 0.0 and is_squeezed(crowding, i, j, part, SQUEEZED_CROWDING_RATIO):
-        edge = find_most_crowded(crowding, part, SQUEEZED_CROWDING_RATIO, counts, kept)
+    largest, i, j = find_fastest_cell(rates, members[: rates.shape[1]])
+    if share > 0.0 and is_squeezed(crowding, i, j, share, SQUEEZED_CROWDING_RATIO):
+        edge = find_most_crowded(crowding, share, SQUEEZED_CROWDING_RATIO, counts, members)
         return (*scan_rates(rates, crowding, edge), valid)
-    return most, i, j, most, valid
+    return largest, i, j, largest, valid
 
 
 def find_most_crowded_of_bands(
@@ -189,5 +189,7 @@ def scan_rates_of_bands(cut: CutBlock, most_crowded: float) -> tuple[float, int,
         block.rates_new[first:last], block.crowding[first:last], most_crowded
     )
     rates_of_bands = cut.group.allgather((rate, first + i, j, bulk))
-    most = max(rates_of_bands, key=lambda band: band[0])  # the first maximum, as in the whole block
-    return *most[:3], max(band[3] for band in rates_of_bands)
+    fastest = max(
+        rates_of_bands, key=lambda band: band[0]
+    )  # the first maximum, as in the whole block
+    return *fastest[:3], max(band[3] for band in rates_of_bands)

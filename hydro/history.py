@@ -23,16 +23,16 @@ ColumnGroup = Callable[[Flow], dict[str, float | int]]
 
 def compute_grid_quality(flow: Flow) -> dict[str, float | int]:
     """The worst cells of all blocks."""
-    found = flow.motion.quality or [measure_worst(block.nodes) for block in flow.blocks]
-    sine, aspect, bad, triangles = found[0]
-    for row in found[1:]:
+    quality = flow.motion.quality or [measure_worst(block.nodes) for block in flow.blocks]
+    sine, aspect, bad_cells, triangles = quality[0]
+    for row in quality[1:]:
         sine = row[0] if row[0] < sine else sine
         aspect = row[1] if row[1] > aspect else aspect
-        bad = bad + row[2]
+        bad_cells = bad_cells + row[2]
         triangles = triangles + row[3]
     return {
         "least_scaled_jacobian": sine,
-        "cells_not_convex": int(bad),
+        "cells_not_convex": int(bad_cells),
         "cells_triangular": int(triangles),
         "worst_aspect": aspect,
     }

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.boundary import Interface, Linked, Seam, Sliding, put
+from shockgrid.hydro.boundary import Linked, Sliding, put
 from shockgrid.hydro.carried.fields import check_same
 from shockgrid.hydro.eos.base import is_same_material
 from shockgrid.hydro.perimeter.contacts import (
@@ -55,8 +55,7 @@ class Link:
                 "sliding contact (slide)"
             )
         misfits = [
-            _misfit(leader_line, follower_line[:, ::order], leader.kind == "periodic")
-            for order in (1, -1)
+            _misfit(leader_line, follower_line[:, ::order], leader.is_shifted) for order in (1, -1)
         ]
         self.reverse = bool(misfits[1][0].max() < misfits[0][0].max())
         gaps, self.shift = misfits[self.reverse]
@@ -78,15 +77,15 @@ class Link:
         # set by `hydro.motion.sides`, for `add_layer_flux`: the velocities of the line's nodes
         # beside those of its contact, and whether the line is closed
         self.layer = np.empty((2, 0)), False
-        self.passes_mass = isinstance(leader, Seam)
+        self.passes_mass = leader.passes_mass
         # of solids that stick together: seams and bonds
         self._sticking: tuple | None = None
-        one_stress = leader.block.stress
-        two_stress = follower.block.stress
-        if one_stress is not None and two_stress is not None and leader.sticks:
+        leader_stress = leader.block.stress
+        follower_stress = follower.block.stress
+        if leader_stress is not None and follower_stress is not None and leader.sticks:
             self._sticking = (
-                one_stress.list_for_link(leader.block),
-                two_stress.list_for_link(follower.block),
+                leader_stress.list_for_link(leader.block),
+                follower_stress.list_for_link(follower.block),
                 pairs,
             )
         # make matching nodes bitwise equal
@@ -117,26 +116,26 @@ class Link:
 
 
 def _check_materials(leader: Linked, follower: Linked) -> None:
-    """Raise BadInput where a seam joins two materials, and for a bond of what bears no shear."""
+    """Raise BadInput where mass passes between two materials, and for a bond of what bears no shear."""
     leader_eos = leader.block.eos
     follower_eos = follower.block.eos
     for segment in (leader, follower):
-        if isinstance(leader, Interface) and leader.bonded and segment.block.strength is None:
+        if leader.bonded and segment.block.strength is None:
             raise BadInput(
                 f"{leader.kind}: {leader} and {follower} are bonded, and the material of block "
                 f"{segment.block.name!r} has no strength; only solids bear shear"
             )
-    if isinstance(leader, Seam) and leader.block.strength != follower.block.strength:
+    if leader.passes_mass and leader.block.strength != follower.block.strength:
         raise BadInput(
             f"{leader.kind}: material passes between {leader} and {follower}, and its strength "
             f"differs: {leader.block.strength} and {follower.block.strength}"
         )
-    if isinstance(leader, Seam) and not is_same_material(leader_eos, follower_eos):
+    if leader.passes_mass and not is_same_material(leader_eos, follower_eos):
         raise BadInput(
             f"{leader.kind}: material passes between {leader} and {follower}, and their equations "
             f"of state differ: {leader_eos} and {follower_eos}; join two materials by an interface"
         )
-    if isinstance(leader, Seam):
+    if leader.passes_mass:
         check_same(
             f"{leader.kind}: material passes between {leader} and {follower}",
             leader.block.carried_fields,
@@ -241,7 +240,7 @@ def join(kind: str, leader: Faces, follower: Faces, **options: Any) -> Link:
     )
     if not isinstance(leader_segment, Linked) or not isinstance(follower_segment, Linked):
         raise BadInput(f"segments of kind {kind!r} cannot be joined; use `put`")
-    if kind == "sliding":
+    if leader_segment.is_sliding:
         raise BadInput("segments of kind 'sliding' are joined by `slide`, not by `join`")
     return Link(leader_segment, follower_segment)
 

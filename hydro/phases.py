@@ -44,9 +44,9 @@ def _add_weight(block: Block, acceleration: np.ndarray) -> None:
     normal = rim.rows[NORMAL]
     centres = block.gather_perimeter(compute_centres(block.nodes))
     across = (acceleration * normal).sum(axis=0) / (normal * normal).sum(axis=0)
-    way = ((rim.rows[AREA_CENTRE] - centres) * normal).sum(axis=0)
+    depth = ((rim.rows[AREA_CENTRE] - centres) * normal).sum(axis=0)
     for first, last, _ in block.plan.walls:
-        rim.p_ghost[first:last] += (2.0 * rim.rho * across * way)[first:last]
+        rim.p_ghost[first:last] += (2.0 * rim.rho * across * depth)[first:last]
 
 
 def predict(block: Block, dt: float) -> None:

@@ -108,9 +108,9 @@ class Rim:
     def __getitem__(self, span: Span) -> Rim:
         return Rim(self.rows[:, span.first : span.last])
 
-    def get_carried(self, part: int) -> np.ndarray:
+    def get_carried(self, carried_row: int) -> np.ndarray:
         """A view (fields, faces) of a row of all carried fields, such as CARRIED_GHOST."""
-        return self.rows[ROWS + part :: CARRIED_ROWS]
+        return self.rows[ROWS + carried_row :: CARRIED_ROWS]
 
     @property
     def faces(self) -> int:

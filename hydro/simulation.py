@@ -24,6 +24,7 @@ from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
 from shockgrid.hydro.motion.line import Line, LineRule
 from shockgrid.hydro.motion.overlaps import Overlaps
 from shockgrid.hydro.motion.tension import SurfaceTension
+from shockgrid.hydro.perimeter.contacts import AXIS
 from shockgrid.hydro.ranks.blocks import Blocks
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.hydro.small_cells import SmallCells
@@ -34,12 +35,27 @@ from shockgrid.regrid.compilation.first_calls import is_interpreting
 from shockgrid.regrid.errors import BadInput, Place, RunFailure
 from shockgrid.regrid.sides import SIDE_NAMES
 
-LEAST_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
+LEAST_STEP_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 # the same where the flow can go on without the line that makes the steps short
-LEAST_PART_BEFORE_HANDOVER = 0.02
+LEAST_STEP_PART_BEFORE_HANDOVER = 0.02
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 # that a state has before its first step
 START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
+
+# what is made anew with other blocks
+REBUILT_PARTS = (
+    "_blocks",
+    "_shared",
+    "_overlaps",
+    "exchange",
+    "motion",
+    "meetings",
+    "tension",
+    "_body_source",
+    "ledger",
+    "small_cells",
+    "_flow",
+)
 
 
 class Refining(Protocol):
@@ -249,7 +265,9 @@ class Simulation:
             )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         ranks.workers = Workers(cells or [1], self._wanted_threads, processors)
-        self._shared = self.small_cells.blocks = self._body_source.blocks = ranks
+        self._shared = ranks
+        self.small_cells.blocks = ranks
+        self._body_source.blocks = ranks
         self.motion.use_ranks(ranks)
         self._flow = replace(self._flow, blocks=ranks)
 
@@ -321,20 +339,23 @@ class Simulation:
         places = refining.choose(self.step, self.motion.sides.lines)
         if places is None:
             return
-        attributes_before = dict(self.__dict__)
+        # the blocks and all that is made with them, to be kept where no new grid is found
+        kept = {name: getattr(self, name) for name in REBUILT_PARTS}
+        # the new blocks are made by the problem, from states; their grids then come from `lay`
         old = self._blocks
         inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
         self._lay_cells(refining, places.size - 1, inside)
         try:
             laid_blocks = refining.lay(places, old, self.motion, self.t)
         except RunFailure:
-            self.__dict__.update(attributes_before)
+            for name, kept_part in kept.items():
+                setattr(self, name, kept_part)
             return
         for block, (nodes, held) in zip(self._blocks, laid_blocks, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
             for name, array in held.items():
                 block.get_inside(name)[...] = array
-        self.motion.counts = attributes_before["motion"].counts  # of the step that is over
+        self.motion.counts = kept["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
 
@@ -397,16 +418,15 @@ class Simulation:
             self._lay_cells(self.refining, counts.pop(), states)
 
     def _check_collapse(self) -> None:
-        """Raise RunFailure where the next step would be too short to get anywhere.
+        """Raise RunFailure where the next step would be too short to bring the run to its end.
 
-        Its sentence is about the cell that rejects every longer step, or whose rate collapses dt.
+        It names the reason for which longer steps were rejected, or the cell with the largest rate.
         """
         clock = self.clock
-        ranks = self._shared
         dt, limit = clock.choose_dt()
         can_hand_over = self.handover is not None and self.handover.first_nodes is None
-        least = LEAST_PART_BEFORE_HANDOVER if can_hand_over else LEAST_PART
-        if dt >= least * clock.first_stable_dt or limit in ("t_end", "start"):
+        least_part = LEAST_STEP_PART_BEFORE_HANDOVER if can_hand_over else LEAST_STEP_PART
+        if dt >= least_part * clock.first_stable_dt or limit in ("t_end", "start"):
             return
         when = f"t = {clock.t:.6g} s (step {clock.step})"
         if limit == "retry" and self.last_reason:
@@ -414,17 +434,13 @@ class Simulation:
                 f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
                 RunFailure,
             )
-        pieces = [(n, self._blocks[n].find_rate()) for n, _, _ in ranks.pieces]
-        rates = ranks.exchange_pieces(pieces, 2)
-        smallest = ranks.exchange_rows([_find_smallest(self._blocks[n]) for n in ranks.own], 2)
-        number = int(max(rates, key=lambda row: row[1])[0])
-        block = self._blocks[number]
-        i, j = (int(index) for index in smallest[number])
+        fastest = self.small_cells.fastest
+        name = self._blocks[fastest.block].name
         raise RunFailure(
-            f"flow: the time step has collapsed to {dt:.3g} s in block {block.name!r} (smallest "
-            f"cell is i={i}, j={j}), {when}",
+            f"flow: the time step has collapsed to {dt:.3g} s in block {name!r} (waves cross cell "
+            f"i={fastest.i}, j={fastest.j} fastest), {when}",
             cause="collapse",
-            place=Place(block.name, (i, j)),
+            place=Place(name, (fastest.i, fastest.j)),
         )
 
     def start_row(self) -> dict:
@@ -479,12 +495,6 @@ class Simulation:
         self._note_end()
 
 
-def _find_smallest(block: Block) -> tuple[int, int]:
-    volume = block.volume
-    i, j = np.unravel_index(volume.argmin(), volume.shape)
-    return int(i), int(j)
-
-
 def _make_barrier():
     from shockgrid.regrid.registry import make_regridder
 
@@ -519,9 +529,9 @@ def _check_parts(blocks: Any, links: Any) -> None:
 
 def _check_links(blocks: list[Block], links: list[Link | SlidingContact]) -> None:
     """Every segment that needs a partner is in exactly one link; raises BadInput otherwise."""
-    given = {id(block) for block in blocks}
+    block_ids = {id(block) for block in blocks}
     for segment in (segment for link in links for segment in link.segments):
-        if id(segment.block) not in given:
+        if id(segment.block) not in block_ids:
             raise BadInput(f"{segment} is linked, and its block is not among the simulation's")
     linked = [id(segment) for link in links for segment in link.segments]
     for block in blocks:
@@ -537,9 +547,9 @@ def _check_axis(block: Block) -> None:
     """Faces on the axis of axisymmetric flow, and no others, are axis segments; else BadInput."""
     for segment in block.segments:
         on_axis = not segment.line(block.nodes)[1].any()
-        if segment.kind == "axis" and not block.geometry.curved:
+        if segment.wall == AXIS and not block.geometry.curved:
             raise BadInput(f"{segment}: plane flow has no axis; put a 'wall' there")
-        if on_axis and segment.kind != "axis" and block.geometry.curved:
+        if on_axis and segment.wall != AXIS and block.geometry.curved:
             raise BadInput(
                 f"{segment}: a {segment.kind} segment lies on the axis y = 0, where nothing can "
                 "pass; put an 'axis' segment there"

@@ -560,15 +560,15 @@ class SmallCells:
 
     def find_rate(self) -> float:
         """The rate [1/s] that sets the next step, from the results of `scan`; theory F7.3."""
-        most = Fastest(-1.0, 0, 0, 0)
+        fastest = Fastest(-1.0, 0, 0, 0)
         limit = -1.0
         for number, (rate, i, j, bulk) in enumerate(self.scanned):
             limit = max(limit, bulk)
-            if rate > most.rate:
-                most = Fastest(rate, number, int(i), int(j))
-        self.fastest = most
-        if most.rate <= limit * RATE_MARGIN:
-            return most.rate
+            if rate > fastest.rate:
+                fastest = Fastest(rate, number, int(i), int(j))
+        self.fastest = fastest
+        if fastest.rate <= limit * RATE_MARGIN:
+            return fastest.rate
         above = self._find_rows_above(limit)
         for number, cut in self.blocks.cuts.items():
             cut.gather_rows(cut.block.rates, above[number])

@@ -39,7 +39,7 @@ class BodySource:
         self.function = function
         self.gained = np.zeros(3)
         for block in blocks:
-            block.part_start(function is not None)
+            block.use_start_copies(function is not None)
 
     def start_step(self, t: float, dt: float) -> None:
         """The first half of the source from t over dt, on the states that the step starts from."""
@@ -83,7 +83,7 @@ class BodySource:
         x, y = compute_centres(block.nodes)
         push_x, push_y, heat = self.function(block, x, y, t, dt)
         push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
-        state, *others = held
+        state, *void_arrays = held
         inside = state[:, 1:-1, 1:-1]
         rho, u, v, _ = inside
         du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
@@ -93,5 +93,5 @@ class BodySource:
         u += du
         v += dv
         if np.any(heat):
-            add_heat(block.eos, heat, inside, *others)
+            add_heat(block.eos, heat, inside, *void_arrays)
         return push, gained

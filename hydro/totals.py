@@ -80,9 +80,9 @@ class TileTotals:
 
     def sum_up(self) -> bool:
         """Sum the tiles; returns whether the state is valid.  See `sum_tiles`."""
-        good = sum_tiles(self.rows, self.array)
+        is_valid = sum_tiles(self.rows, self.array)
         self.read_array()
-        return good
+        return is_valid
 
     def read_array(self) -> None:
         """Read the sums from `array`, where a kernel or another rank has written them."""

@@ -55,13 +55,13 @@ class CarriedField:
         Raises BadInput for values that are no numbers, too many or too few, or out of bounds.
         """
         shape = centres.shape[1:]
-        given = self.first(*centres) if callable(self.first) else self.first
+        first_values = self.first(*centres) if callable(self.first) else self.first
         what = f"block {block!r}: carried field {self.name!r}"
         try:
-            values = np.broadcast_to(np.asarray(given, dtype=np.float64), shape)
+            values = np.broadcast_to(np.asarray(first_values, dtype=np.float64), shape)
         except (TypeError, ValueError):
             raise BadInput(
-                f"{what}: its first values have shape {np.shape(given)}; the block has "
+                f"{what}: its first values have shape {np.shape(first_values)}; the block has "
                 f"{shape[0]} x {shape[1]} cells"
             ) from None
         self.check(what, values)
@@ -78,9 +78,9 @@ class CarriedField:
             )
 
 
-def read_fields(block: str, given: Sequence[CarriedField]) -> tuple[CarriedField, ...]:
+def read_fields(block: str, fields: Sequence[CarriedField]) -> tuple[CarriedField, ...]:
     """The carried fields of a new block; raises BadInput where two have one name."""
-    fields = tuple(given)
+    fields = tuple(fields)
     for field in fields:
         if not isinstance(field, CarriedField):
             raise BadInput(f"block {block!r}: {field!r} is no CarriedField")
@@ -92,33 +92,35 @@ def read_fields(block: str, given: Sequence[CarriedField]) -> tuple[CarriedField
 
 
 def read_values(
-    what: str, fields: Sequence[CarriedField], given: Mapping[str, Any] | None
+    what: str, fields: Sequence[CarriedField], values_given: Mapping[str, Any] | None
 ) -> np.ndarray:
     """A value of each field (n,), such as beyond an open side; raises BadInput where one lacks."""
-    given = given or {}
+    values_given = values_given or {}
     names = [field.name for field in fields]
-    for name in given:
+    for name in values_given:
         if name not in names:
             known = ", ".join(names) or "none"
             raise BadInput(f"{what}: {name!r} is no carried field of the block; it has {known}")
-    missing = [name for name in names if name not in given]
+    missing = [name for name in names if name not in values_given]
     if missing:
         raise BadInput(
             f"{what}: the block carries {missing[0]!r}; say with what value it comes in, such as "
             f"carried = {{{missing[0]} = 0}}"
         )
-    values = np.array([float(given[field.name]) for field in fields])
+    values = np.array([float(values_given[field.name]) for field in fields])
     for field, value in zip(fields, values, strict=True):
         field.check(f"{what}: carried field {field.name!r}", value)
     return values
 
 
-def check_same(what: str, one: Sequence[CarriedField], other: Sequence[CarriedField]) -> None:
+def check_same(
+    what: str, fields: Sequence[CarriedField], other_fields: Sequence[CarriedField]
+) -> None:
     """Raise BadInput, which begins with `what`, where blocks carry fields of other names."""
-    names = [field.name for field in one]
-    others = [field.name for field in other]
-    if names != others:
+    names = [field.name for field in fields]
+    other_names = [field.name for field in other_fields]
+    if names != other_names:
         raise BadInput(
             f"{what}, and their carried fields differ: {', '.join(names) or 'none'}, and "
-            f"{', '.join(others) or 'none'}; give both blocks the same in the same order"
+            f"{', '.join(other_names) or 'none'}; give both blocks the same in the same order"
         )

@@ -60,11 +60,11 @@ SLOPE_PARTS = 3
 
 
 @inlined
-def bound(change, value, least, most):
-    """The part of a change of `value` that does not lead beyond least..most: at most 1."""
-    room = most - value if change > 0.0 else value - least
+def bound(change, value, lowest, highest):
+    """The part of a change of `value` that does not lead beyond lowest..highest: at most 1."""
+    allowed = highest - value if change > 0.0 else value - lowest
     size = abs(change)
-    return room / size if size > room else 1.0
+    return allowed / size if size > allowed else 1.0
 
 
 @kernel(allocates=False)
@@ -98,7 +98,7 @@ def make_difference_weights(geometry: Geometry):
     curved = geometry.curved
 
     @inlined
-    def weigh(measures, length, here, before, after):
+    def compute_difference_weights(measures, length, here, before, after):
         """Weights of the differences to the cells before and after; indices (i, j)."""
         shift = length + 1
         if curved:
@@ -116,14 +116,14 @@ def make_difference_weights(geometry: Geometry):
             measures[length, after[0], after[1]],
         )
 
-    return weigh
+    return compute_difference_weights
 
 
 @functools.cache
 def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
     """Kernel that fills the slopes of carried fields, of a geometry and a limiter's formula."""
     curved = geometry.curved
-    weigh = make_difference_weights(geometry)
+    compute_difference_weights = make_difference_weights(geometry)
 
     @compiled_once(allocates=False)
     def measure_cell(nodes, i, j, measures, centres):
@@ -158,28 +158,32 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
             twist, y = find_twist(a, b, c, d)
             line_i, line_j = lean_lines(line_i, line_j, twist, y)
             inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
-        here = i + 1, j + 1
+        cell = i + 1, j + 1
         value = field[i + 1, j + 1]
         before = field[i, j + 1]
         after = field[i + 2, j + 1]
         below = field[i + 1, j]
         above = field[i + 1, j + 2]
-        first, second = weigh(measures, LENGTH_I, here, (i, j + 1), (i + 2, j + 1))
-        along_i = limit((value - before) * first, (after - value) * second)
-        first, second = weigh(measures, LENGTH_J, here, (i + 1, j), (i + 1, j + 2))
-        along_j = limit((value - below) * first, (above - value) * second)
+        weight_before, weight_after = compute_difference_weights(
+            measures, LENGTH_I, cell, (i, j + 1), (i + 2, j + 1)
+        )
+        along_i = limit((value - before) * weight_before, (after - value) * weight_after)
+        weight_before, weight_after = compute_difference_weights(
+            measures, LENGTH_J, cell, (i + 1, j), (i + 1, j + 2)
+        )
+        along_j = limit((value - below) * weight_before, (above - value) * weight_after)
         slope_x, slope_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
         # nowhere in the cell beyond the values around
-        least = min(value, min(min(before, after), min(below, above)))
-        most = max(value, max(max(before, after), max(below, above)))
+        lowest = min(value, min(min(before, after), min(below, above)))
+        highest = max(value, max(max(before, after), max(below, above)))
         x = centres[0, i, j]
         y = centres[1, i, j]
-        part = 1.0
+        slope_fraction = 1.0
         for corner in (a, b, c, d):
             change = slope_x * (corner[0] - x) + slope_y * (corner[1] - y)
-            part = min(part, bound(change, value, least, most))
-        slope_x *= part
-        slope_y *= part
+            slope_fraction = min(slope_fraction, bound(change, value, lowest, highest))
+        slope_x *= slope_fraction
+        slope_y *= slope_fraction
         along_flow = state[U, i + 1, j + 1] * slope_x + state[V, i + 1, j + 1] * slope_y
         slopes[AT_CENTRE, i, j] = value - half_dt * along_flow
         slopes[SLOPE_X, i, j] = slope_x

@@ -125,9 +125,9 @@ class Wall:
     def sample(self, along: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
         """(temperature or None, flux) at the coordinates `along` (n,)."""
 
-        def values(given: Along) -> np.ndarray:
-            found = given(along) if callable(given) else given
-            return np.broadcast_to(np.asarray(found, dtype=np.float64), along.shape)
+        def values(wall_values: Along) -> np.ndarray:
+            values_along = wall_values(along) if callable(wall_values) else wall_values
+            return np.broadcast_to(np.asarray(values_along, dtype=np.float64), along.shape)
 
         if self.temperature is not None:
             return values(self.temperature), np.zeros_like(along)
@@ -176,9 +176,9 @@ def check_walls(walls: Mapping[str, Wall]) -> None:
     for low, high in PAIRS:
         if (walls[low].flow == "periodic") != (walls[high].flow == "periodic"):
             lonely = low if walls[low].flow == "periodic" else high
-            other = high if lonely == low else low
+            opposite = high if lonely == low else low
             raise BadInput(
-                f"side {lonely} is periodic but {other} is a wall; they must both be periodic"
+                f"side {lonely} is periodic but {opposite} is a wall; they must both be periodic"
             )
     if all(wall.flow == "periodic" for wall in walls.values()):
         raise BadInput("a convection cell cannot be periodic both ways; give it two walls")

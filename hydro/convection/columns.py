@@ -186,24 +186,24 @@ def step_column(
     steady = math.isinf(dt)
     speed = column.through_flow - (0.0 if steady else (x - x_old) / dt)
     speed = np.broadcast_to(speed, x.shape)
-    now = 0.0 * np.diff(x) if steady else np.diff(x) / dt
-    before = now if steady else np.diff(x_old) / dt
+    inverse_times = 0.0 * np.diff(x) if steady else np.diff(x) / dt
+    inverse_times_old = inverse_times if steady else np.diff(x_old) / dt
 
     bands, walls = assemble_transport(x, speed, column.diffusivity, column.scheme)
-    bands[1] += now
-    heat = before * temperature
+    bands[1] += inverse_times
+    heat = inverse_times_old * temperature
     heat[[0, -1]] -= walls * np.array(column.temperatures)
     temperature = solve_banded((1, 1), bands, heat)
 
     # v is linear in T0: one part without it, one for T0 = -1, combined for the given mean.
     bands, _ = assemble_transport(x, speed, column.viscosity, column.scheme)
-    bands[1] += now
+    bands[1] += inverse_times
     steps = np.diff(x)
-    driven = before * velocity + column.buoyancy * temperature * steps
-    parts = solve_banded((1, 1), bands, np.stack([driven, steps], axis=1))
-    flow, unit = steps @ parts
-    lift = (column.mean_speed * (x[-1] - x[0]) - flow) / unit
-    velocity = parts[:, 0] + lift * parts[:, 1]
+    forced = inverse_times_old * velocity + column.buoyancy * temperature * steps
+    velocities = solve_banded((1, 1), bands, np.stack([forced, steps], axis=1))
+    forced_mean, lift_mean = steps @ velocities
+    lift = (column.mean_speed * (x[-1] - x[0]) - forced_mean) / lift_mean
+    velocity = velocities[:, 0] + lift * velocities[:, 1]
     reference = -lift / column.buoyancy if column.buoyancy != 0.0 else 0.0
     return temperature, velocity, reference
 
@@ -353,7 +353,8 @@ class ColumnMarch:
         sizes = (x[-1] - x[0], np.ptp(column.temperatures) or 1.0, np.abs(velocity).max() or 1.0)
         changes = (x - self.x, temperature - self.temperature, velocity - self.velocity)
         change = max(
-            float(np.abs(one).max()) / size for one, size in zip(changes, sizes, strict=True)
+            float(np.abs(difference).max()) / size
+            for difference, size in zip(changes, sizes, strict=True)
         )
         # per diffusive time, not per step: short steps change little even if unsteady
         change *= (x[-1] - x[0]) ** 2 / column.diffusivity / dt
@@ -518,8 +519,10 @@ def follow_last_move(x: np.ndarray, last: np.ndarray) -> np.ndarray:
     steps = np.diff(x)
     change = np.diff(x - last)
     closing = float((change / steps).min())
-    part = 1.0 if closing >= LEAST_CELL_SHRINKAGE - 1.0 else (LEAST_CELL_SHRINKAGE - 1.0) / closing
-    return x + part * (x - last)
+    followed_fraction = (
+        1.0 if closing >= LEAST_CELL_SHRINKAGE - 1.0 else (LEAST_CELL_SHRINKAGE - 1.0) / closing
+    )
+    return x + followed_fraction * (x - last)
 
 
 @dataclass(frozen=True)

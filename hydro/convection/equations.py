@@ -47,13 +47,13 @@ Matrix = sparse.csr_matrix
 Ends = tuple[float, float]  # of an axis: 1 if the wall's value is given, 0 if the slope vanishes
 
 
-def kron(component: int, own: Matrix | np.ndarray, cross: Matrix | np.ndarray) -> Matrix:
+def kron(component: int, along: Matrix | np.ndarray, cross: Matrix | np.ndarray) -> Matrix:
     """Product of a matrix along the direction `component` (0: x) and one across it.
 
     A one-dimensional array represents a diagonal matrix.  (scipy's `kron` is five times slower on
     such small matrices.)
     """
-    first, second = (own, cross) if component == 0 else (cross, own)
+    first, second = (along, cross) if component == 0 else (cross, along)
     (rows, columns, values, shape), (rows2, columns2, values2, shape2) = map(
         get_entries, (first, second)
     )
@@ -107,16 +107,16 @@ def make_topology(cells: tuple[int, int], periodic: tuple[bool, bool]) -> Topolo
     balance = []
     # operators along each axis: products of one along it and one across
     for k in (0, 1):
-        own = axes[k]
+        axis = axes[k]
         cross = axes[1 - k]
-        nodes = np.ones(own.node_count)
+        nodes = np.ones(axis.node_count)
         inside = np.ones(cross.cells)
         out_of_nodes = kron(k, nodes, cross.difference_to_cells())
         curls.append((1.0 - 2.0 * k) * out_of_nodes)
-        averages.append(kron(k, own.average_to_cells(), inside))
-        halves.append(kron(k, own.halves_to_nodes(), np.ones(cross.node_count)))
-        outflows.append((kron(k, own.difference_to_nodes(), inside), out_of_nodes))
-        balance.append(kron(k, own.difference_to_cells(), inside))
+        averages.append(kron(k, axis.average_to_cells(), inside))
+        halves.append(kron(k, axis.halves_to_nodes(), np.ones(cross.node_count)))
+        outflows.append((kron(k, axis.difference_to_nodes(), inside), out_of_nodes))
+        balance.append(kron(k, axis.difference_to_cells(), inside))
     # put together over both components
     curl = (sparse.vstack(curls) @ free).tocsr()
     spread = [[averages[0], None], [None, halves[0]], [None, averages[1]], [halves[1], None]]
@@ -165,27 +165,27 @@ class Momentum:
         stress = []
         values = []
         for k in (0, 1):
-            own = axes[k]
+            axis = axes[k]
             cross = axes[1 - k]
-            nodes = np.ones(own.node_count)
+            nodes = np.ones(axis.node_count)
             length = np.outer(nodes, cross.widths)
-            reach = np.outer(own.distances, np.ones(cross.cells))
+            reach = np.outer(axis.distances, np.ones(cross.cells))
             lengths.append((length if k == 0 else length.T).ravel())
             reaches.append((reach if k == 0 else reach.T).ravel())
             values.append(kron(k, nodes, cross.interpolate_to_nodes()))
-            along = scale_rows(1.0 / own.widths, own.difference_to_cells())
+            along = scale_rows(1.0 / axis.widths, axis.difference_to_cells())
             across = scale_rows(1.0 / cross.distances, cross.difference_to_nodes(*ends[k]))
             out_of_cells, out_of_nodes = topology.outflows[k]
             stress.append(
                 out_of_cells @ kron(k, along, cross.widths)
-                + out_of_nodes @ kron(k, own.distances, across)
+                + out_of_nodes @ kron(k, axis.distances, across)
             )
         self.lengths = np.concatenate(lengths)
         self.reaches = np.concatenate(reaches)
         over = scale_rows(1.0 / self.lengths, topology.curl)
         first, second = topology.averages
-        parts = [[first, None], [values[0], None], [None, second], [None, values[1]]]
-        self.carry: Matrix = sparse.bmat(parts, "csr")  # velocities -> faces of control volumes
+        blocks = [[first, None], [values[0], None], [None, second], [None, values[1]]]
+        self.carry: Matrix = sparse.bmat(blocks, "csr")  # velocities -> faces of control volumes
         # sums around free nodes: of friction over viscosity, and of momentum
         self.friction: Matrix = (over.T @ (sparse.block_diag(stress, "csr") @ over)).tocsr()
         weighted = scale_rows(self.reaches / self.lengths, topology.curl)
@@ -217,9 +217,9 @@ class Momentum:
         pulls = []
         cut = self.axes[0].node_count * self.axes[1].cells
         for k, columns in ((0, slice(0, cut)), (1, slice(cut, None))):
-            own = self.axes[k]
+            axis = self.axes[k]
             cross = self.axes[1 - k]
-            reach = scale_rows(own.distances, own.interpolate_to_nodes())
+            reach = scale_rows(axis.distances, axis.interpolate_to_nodes())
             pull = kron(k, reach, np.ones(cross.cells))
             pulls.append(self.topology.curl_transposed[:, columns] @ pull)
         return tuple(pulls)
@@ -248,10 +248,10 @@ def make_heat(axes: tuple[Axis, Axis], ends: tuple[Ends, Ends], topology: Topolo
     values = []
     gradient = []
     for k in (0, 1):
-        own = axes[k]
+        axis = axes[k]
         cross = axes[1 - k]
-        slope = scale_rows(1.0 / own.distances, own.difference_to_nodes(*ends[k]))
-        values.append(kron(k, own.interpolate_to_nodes(), np.ones(cross.cells)))
+        slope = scale_rows(1.0 / axis.distances, axis.difference_to_nodes(*ends[k]))
+        values.append(kron(k, axis.interpolate_to_nodes(), np.ones(cross.cells)))
         gradient.append(kron(k, slope, cross.widths))
     slopes = sparse.vstack(gradient, "csr")
     balance = topology.balance
@@ -303,19 +303,19 @@ class Equations:
         the given heat through other walls, in +x or +y [K m2/s].  Zero elsewhere."""
         whole = [np.zeros(self.momentum.lengths.size) for _ in range(3)]
         for k, (low, high) in enumerate(PAIRS):
-            own = self.axes[k]
+            axis = self.axes[k]
             cross = self.axes[1 - k]
-            if own.periodic:
+            if axis.periodic:
                 continue
-            parts = [self.split_faces(values)[k] for values in whole]
+            face_values = [self.split_faces(values)[k] for values in whole]
             if k == 1:
-                parts = [part.T for part in parts]
+                face_values = [values_of_faces.T for values_of_faces in face_values]
             for end, sign, side in ((0, -1.0, low), (-1, 1.0, high)):
                 temperature, flux = self.walls[side].sample(cross.centres)
                 if temperature is not None:
-                    parts[0][end] = temperature
-                    parts[1][end] = sign * temperature / own.distances[end] * cross.widths
-                parts[2][end] = sign * flux * cross.widths
+                    face_values[0][end] = temperature
+                    face_values[1][end] = sign * temperature / axis.distances[end] * cross.widths
+                face_values[2][end] = sign * flux * cross.widths
         return tuple(whole)
 
     def buoyancy(self, fluid: Fluid) -> sparse.csr_matrix:

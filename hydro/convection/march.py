@@ -72,13 +72,13 @@ def compute_swept(old: Equations, new: Equations) -> np.ndarray:
     Nodes move uniformly: a face's displacement times its mean length is exact, and the areas that
     the faces of a cell sweep add up exactly to its growth.
     """
-    parts = []
+    swept_volumes = []
     for k in (0, 1):
         shift = (new.axes[k].nodes - old.axes[k].nodes)[: new.axes[k].node_count]
         length = 0.5 * (new.axes[1 - k].widths + old.axes[1 - k].widths)
         swept = np.outer(shift, length)
-        parts.append((swept if k == 0 else swept.T).ravel())
-    return np.concatenate(parts)
+        swept_volumes.append((swept if k == 0 else swept.T).ravel())
+    return np.concatenate(swept_volumes)
 
 
 class March:
@@ -129,12 +129,12 @@ class March:
         flux = np.abs(equations.momentum.curl @ self.level.psi)
         across, up = equations.split_faces(flux)
         through = np.zeros(equations.shape)
-        for k, part in ((0, across), (1, up)):
-            part = np.moveaxis(part, k, 0)
+        for k, speeds in ((0, across), (1, up)):
+            speeds = np.moveaxis(speeds, k, 0)
             ends = (
-                part + np.roll(part, -1, axis=0)
+                speeds + np.roll(speeds, -1, axis=0)
                 if equations.axes[k].periodic
-                else (part[1:] + part[:-1])
+                else (speeds[1:] + speeds[:-1])
             )
             through += 0.5 * np.moveaxis(ends, 0, k)
         fastest = float((through / equations.areas.reshape(equations.shape)).max())
@@ -144,14 +144,14 @@ class March:
 
     def choose_step(self, remaining: float = math.inf) -> float:
         """dt [s] of the next step: the last one if it is still allowed, at most `remaining`."""
-        most, limit = self.compute_longest_step()
-        if not math.isfinite(most):
+        longest, limit = self.compute_longest_step()
+        if not math.isfinite(longest):
             raise BadInput(
                 "convection: the fluid is at rest and no longest step is given; give one"
             )
         dt = self.dt
-        if not self.dt or dt > most or most > BOX_STEP_GROWTH * dt:
-            dt = most if limit == "longest" else most / math.sqrt(BOX_STEP_GROWTH)
+        if not self.dt or dt > longest or longest > BOX_STEP_GROWTH * dt:
+            dt = longest if limit == "longest" else longest / math.sqrt(BOX_STEP_GROWTH)
             self.limit = limit
         if dt >= remaining * (1.0 - 1e-12):
             self.limit = "end"
@@ -190,9 +190,9 @@ class March:
         conduction, friction = self._factorise(new, first / dt)
 
         carried = relative * (new.heat.values @ extrapolate("temperature"))
-        given = self.fluid.diffusivity * new.wall_gradient + new.wall_flux
+        wall_heat = self.fluid.diffusivity * new.wall_gradient + new.wall_flux
         temperature = conduction.solve(
-            heat - past("heat") / dt - new.heat.balance @ (carried - given)
+            heat - past("heat") / dt - new.heat.balance @ (carried - wall_heat)
         )
         momentum = new.momentum
         velocity = momentum.carry @ extrapolate("velocity")
@@ -243,7 +243,7 @@ class March:
         walls = self.equations.walls
         now = Equations(state["now/x"], state["now/y"], walls)
         same = bool(state["still"])
-        other = now if same else Equations(state["before/x"], state["before/y"], walls)
+        equations_before = now if same else Equations(state["before/x"], state["before/y"], walls)
         levels = [
             Level(
                 grid,
@@ -251,7 +251,7 @@ class March:
                 np.array(state[f"{name}/temperature"]),
                 float(state[f"{name}/entered"]),
             )
-            for name, grid in (("now", now), ("before", other))
+            for name, grid in (("now", now), ("before", equations_before))
         ]
         self.level = levels[0]
         self.before = levels[1] if int(state["levels"]) == 2 else None

@@ -68,9 +68,9 @@ def find_maximum(places: np.ndarray, values: np.ndarray, within=None) -> tuple[f
     roots = spline.derivative().roots(discontinuity=False, extrapolate=False)
     roots = roots[np.isfinite(roots) & (roots >= low) & (roots <= high)]
     candidates = np.concatenate([roots, ends])
-    found = spline(candidates)
-    best = int(np.argmax(found))
-    return float(found[best]), float(candidates[best])
+    spline_values = spline(candidates)
+    best = int(np.argmax(spline_values))
+    return float(spline_values[best]), float(candidates[best])
 
 
 def find_nusselt_maximum(
@@ -86,14 +86,18 @@ def find_nusselt_maximum(
     that a maximum near the corner is not cut off.
     """
     k = SIDE_NAMES.index(side) // 2
-    places, values = compute_local_nusselt(equations, fluid, temperature, side, scale)
+    positions, nusselt = compute_local_nusselt(equations, fluid, temperature, side, scale)
     ends = equations.axes[1 - k].nodes[[0, -1]]
     insulated = (equations.walls[s] in (adiabatic(), adiabatic("free")) for s in PAIRS[1 - k])
-    low, high = (3 * one for one in insulated)
-    whole, heights = (np.pad(array, (low, high), "symmetric") for array in (places, values))
-    whole[:low] = 2 * ends[0] - whole[:low]
-    whole[whole.size - high :] = 2 * ends[1] - whole[whole.size - high :]
-    return find_maximum(whole, heights, (ends, places[[0, -1]]))
+    padding_low, padding_high = (3 * is_insulated for is_insulated in insulated)
+    padded_positions, padded_nusselt = (
+        np.pad(array, (padding_low, padding_high), "symmetric") for array in (positions, nusselt)
+    )
+    padded_positions[:padding_low] = 2 * ends[0] - padded_positions[:padding_low]
+    padded_positions[padded_positions.size - padding_high :] = (
+        2 * ends[1] - padded_positions[padded_positions.size - padding_high :]
+    )
+    return find_maximum(padded_positions, padded_nusselt, (ends, positions[[0, -1]]))
 
 
 def extract_middle(
@@ -104,18 +108,18 @@ def extract_middle(
     u along x = middle, v along y = middle; at a no-slip wall the zero is among the points.
     """
     values = equations.compute_velocities(psi)[component]
-    own = equations.axes[component]
+    axis = equations.axes[component]
     cross = equations.axes[1 - component]
     values = values if component == 0 else values.T
-    middle = 0.5 * (own.nodes[0] + own.nodes[-1])
-    nodes = own.nodes[: own.node_count]
+    middle = 0.5 * (axis.nodes[0] + axis.nodes[-1])
+    nodes = axis.nodes[: axis.node_count]
     line = CubicSpline(nodes, values, axis=0)(middle)
     places = cross.centres
     for end, side in ((0, PAIRS[1 - component][0]), (-1, PAIRS[1 - component][1])):
         if not cross.periodic and slip(equations, side) == 0.0:
-            at = 0 if end == 0 else places.size
-            places = np.insert(places, at, cross.nodes[end])
-            line = np.insert(line, at, 0.0)
+            place = 0 if end == 0 else places.size
+            places = np.insert(places, place, cross.nodes[end])
+            line = np.insert(line, place, 0.0)
     return places, line
 
 
@@ -181,7 +185,9 @@ def compute_growth(
             f"convection: no growth rate was found near {near:g}: {error}", cause="no-growth-rate"
         ) from error
     # a drift between free walls has no temperature and neither grows nor decays
-    sizes = [np.abs(part).max(axis=0) for part in np.split(vectors, [equations.sizes[0]])]
+    sizes = [
+        np.abs(disturbances).max(axis=0) for disturbances in np.split(vectors, [equations.sizes[0]])
+    ]
     warm = sizes[1] * fluid.diffusivity > 1e-6 * sizes[0] * float(np.ptp(temperature))
     best = int(np.argmax(np.where(warm, values.real, -np.inf)))
     vector = filter_disturbance(equations, operator, mass, values[best], FILTER_DETUNING * scale)

@@ -93,9 +93,9 @@ def wall_values(
     equations: Equations, side: str, heat: np.ndarray, diffusivity: float, k: int
 ) -> np.ndarray | float | None:
     """Temperature of a wall at the points of `heat` along it; None for a periodic axis."""
-    own = equations.axes[k]
+    axis = equations.axes[k]
     cross = equations.axes[1 - k]
-    if own.periodic:
+    if axis.periodic:
         return 0.0
     along = cross.centres
     if heat.shape[1 - k] != cross.cells:  # already on the nodes along the wall
@@ -104,7 +104,7 @@ def wall_values(
     if temperature is not None:
         return temperature
     end = 0 if side.endswith("min") else -1
-    return np.take(heat, end, axis=k) + flux / diffusivity * own.distances[end]
+    return np.take(heat, end, axis=k) + flux / diffusivity * axis.distances[end]
 
 
 def to_nodes(axis: Axis, values: np.ndarray, k: int, low, high) -> np.ndarray:
@@ -223,7 +223,7 @@ class SteadySolver:
                 decades = math.ceil(math.log10(rayleigh / FIRST_RAYLEIGH) - 1e-9)
                 self.exponent = -float(decades)
         else:
-            self.psi, self.temperature = (np.array(part, dtype=np.float64) for part in start)
+            self.psi, self.temperature = (np.array(values, dtype=np.float64) for values in start)
         self.good = (self.exponent, self.psi, self.temperature)
         self.before_correction: tuple | None = None  # equations, psi, temperature
         self.caution = 1.0  # fraction of each grid correction that is applied
@@ -377,8 +377,11 @@ class SteadySolver:
         levels = {}
         for name in ("now", "good", "before"):
             equations = Equations(state[f"{name}/x"], state[f"{name}/y"], walls)
-            parts = (np.array(state[f"{name}/{part}"]) for part in ("psi", "temperature"))
-            levels[name] = (equations, *parts)
+            stored = (
+                np.array(state[f"{name}/{name_of_field}"])
+                for name_of_field in ("psi", "temperature")
+            )
+            levels[name] = (equations, *stored)
         self.equations, self.psi, self.temperature = levels["now"]
         self.good = (float(state["good_exponent"]), *levels["good"][1:])
         self.before_correction = levels["before"] if state["corrected"] else None

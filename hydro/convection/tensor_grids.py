@@ -254,12 +254,12 @@ def weigh_gradient(x: np.ndarray, field: np.ndarray, strength: float) -> np.ndar
 
     field: at the nodes (n + 1,), or the size of its gradient in the cells (n,).
     """
-    given = np.asarray(field, dtype=float)
-    if given.shape != (x.size - 1,):
-        given = np.diff(check_profile(field, x)) / np.diff(x)
-    elif not np.isfinite(given).all():
+    gradient = np.asarray(field, dtype=float)
+    if gradient.shape != (x.size - 1,):
+        gradient = np.diff(check_profile(field, x)) / np.diff(x)
+    elif not np.isfinite(gradient).all():
         raise BadInput("a grid cannot follow a gradient that is not finite")
-    size = np.abs(given)
+    size = np.abs(gradient)
     mean = (size @ np.diff(x)) / (x[-1] - x[0])
     if not mean > 0.0:
         return np.ones(size.size)
@@ -278,8 +278,8 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
     free = invert_integral(x, weight, n)
     if compute_neighbour_ratio(free) <= ratio:
         return free
-    parts = np.arange(1, POINTS_PER_OLD_CELL + 1) / POINTS_PER_OLD_CELL
-    fine = np.append(x[0], (x[:-1, None] + np.diff(x)[:, None] * parts).ravel())
+    fractions = np.arange(1, POINTS_PER_OLD_CELL + 1) / POINTS_PER_OLD_CELL
+    fine = np.append(x[0], (x[:-1, None] + np.diff(x)[:, None] * fractions).ravel())
     widths = np.diff(fine)
     wanted = 1.0 / np.repeat(weight, POINTS_PER_OLD_CELL)
     reach = np.log(ratio) * 0.5 * (fine[1:] + fine[:-1])
@@ -293,10 +293,12 @@ def place_nodes(x: np.ndarray, weight: np.ndarray, ratio: float) -> np.ndarray:
         return float((widths / cut(np.exp(logarithm))).sum()) - n
 
     # Without the cut n cells fit exactly; the cut needs more, so C has to grow.
-    least = most = float(np.log((widths / wanted).sum() / n))
-    while excess(most) > 0.0 and most < least + 60.0:
-        most += 1.0
-    constant = np.exp(brentq(excess, least, most, xtol=1e-14)) if most > least else np.exp(least)
+    lowest = highest = float(np.log((widths / wanted).sum() / n))
+    while excess(highest) > 0.0 and highest < lowest + 60.0:
+        highest += 1.0
+    constant = (
+        np.exp(brentq(excess, lowest, highest, xtol=1e-14)) if highest > lowest else np.exp(lowest)
+    )
     return bound_steps(invert_integral(fine, 1.0 / cut(constant), n), ratio)
 
 

@@ -132,9 +132,9 @@ class EquationOfState:
         number = float(value) if isinstance(value, int | float) else np.nan
         if not 0.0 < number < np.inf:
             raise BadInput(f"heat_capacity is {value!r}; it must be a positive number of J/(kg K)")
-        found = copy.copy(self)
-        object.__setattr__(found, "heat_capacity", number)
-        return found
+        material = copy.copy(self)
+        object.__setattr__(material, "heat_capacity", number)
+        return material
 
     def with_fields(self, fields: np.ndarray) -> Self:
         """The same for cells that carry these fields (n, ...); itself where it sees none."""
@@ -164,7 +164,12 @@ class EquationOfState:
             return np.sqrt(self.sound_speed_squared_part(rho, p, self.parameters))
 
 
-PARTS = ("pressure_part", "energy_part", "sound_speed_squared_part", "least_pressure_part")
+SLOPE_FRACTIONS = (
+    "pressure_part",
+    "energy_part",
+    "sound_speed_squared_part",
+    "least_pressure_part",
+)
 
 
 def check_eos(block: str, eos: object) -> None:
@@ -174,7 +179,7 @@ def check_eos(block: str, eos: object) -> None:
         name = eos.__name__
         raise BadInput(f"{where} is the class {name}; one made of it is wanted, {name}(...)")
     kind = type(eos)
-    wanted = (*PARTS, "opens_voids", "has_kinks", "parameters")
+    wanted = (*SLOPE_FRACTIONS, "opens_voids", "has_kinks", "parameters")
     missing = [name for name in wanted if not hasattr(kind, name)]
     if len(missing) == len(wanted):
         raise BadInput(
@@ -182,7 +187,7 @@ def check_eos(block: str, eos: object) -> None:
         )
     if missing:
         raise BadInput(f"{where} is of the class {kind.__name__}, which lacks {', '.join(missing)}")
-    for name in PARTS:
+    for name in SLOPE_FRACTIONS:
         if not isinstance(inspect.getattr_static(kind, name), staticmethod):
             raise BadInput(f"{where}: {kind.__name__}.{name} is not a staticmethod({name})")
         if not hasattr(getattr(kind, name), "compiled_as"):
@@ -196,12 +201,12 @@ def check_eos(block: str, eos: object) -> None:
         raise BadInput(f"{where} is of the class {kind.__name__}, which lacks wave_law") from None
 
 
-def is_same_material(one: Any, two: Any) -> bool:
+def is_same_material(eos: Any, other_eos: Any) -> bool:
     """Do two equations of state give the same pressure everywhere: one kind, equal parameters?"""
-    if type(one) is not type(two):
+    if type(eos) is not type(other_eos):
         return False
-    pairs = zip(one.parameters, two.parameters, strict=True)
-    return one is two or all(np.array_equal(first, second) for first, second in pairs)
+    pairs = zip(eos.parameters, other_eos.parameters, strict=True)
+    return eos is other_eos or all(np.array_equal(first, second) for first, second in pairs)
 
 
 @inlined
@@ -267,8 +272,8 @@ def make_leaving_part(eos_class):
     @inlined
     def find_leaving_part(rho, parameters):
         excess = rho * (1.0 / least_density_part(parameters)) - 1.0
-        part = choose(excess < 1.0, excess, 1.0 + 0.0 * rho)
-        return choose(part > 0.0, part, 0.0 * rho)
+        leaving_part = choose(excess < 1.0, excess, 1.0 + 0.0 * rho)
+        return choose(leaving_part > 0.0, leaving_part, 0.0 * rho)
 
     return find_leaving_part
 
@@ -356,6 +361,6 @@ def check_formulas(block: str, eos: EquationOfState, rho: np.ndarray, p: np.ndar
     extremes = [field.argmin() for field in (rho, p)] + [field.argmax() for field in (rho, p)]
     at = np.unravel_index(np.unique(np.concatenate([spread, extremes])), rho.shape)
     with np.errstate(all="ignore"):
-        found = find_disagreement(eos, rho[at], p[at])
-    if found is not None:
-        raise BadInput(f"block {block!r}: equation of state {eos.kind}: {found}")
+        disagreement = find_disagreement(eos, rho[at], p[at])
+    if disagreement is not None:
+        raise BadInput(f"block {block!r}: equation of state {eos.kind}: {disagreement}")

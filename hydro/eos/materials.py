@@ -196,12 +196,14 @@ def read_materials(path: Path) -> dict[str, Material]:
 
 def _list_names(tables: dict[str, dict]) -> dict[str, str]:
     """All names in small letters, and the material of each; a name of two materials is left out."""
-    found: dict[str, set[str]] = {}
+    materials_by_name: dict[str, set[str]] = {}
     for name, table in tables.items():
-        others = table.get("names", ()) if isinstance(table, dict) else ()
-        for one in (name, *filter(lambda other: isinstance(other, str), others)):
-            found.setdefault(one.lower(), set()).add(name)
-    return {one: materials.pop() for one, materials in found.items() if len(materials) == 1}
+        other_names = table.get("names", ()) if isinstance(table, dict) else ()
+        for one in (name, *filter(lambda other: isinstance(other, str), other_names)):
+            materials_by_name.setdefault(one.lower(), set()).add(name)
+    return {
+        one: materials.pop() for one, materials in materials_by_name.items() if len(materials) == 1
+    }
 
 
 def _find_table(name: str) -> tuple[Path, str]:
@@ -231,5 +233,5 @@ def find_material(name: str) -> Material:
     A name may be one of the material's others, such as "copper" of Cu, in large or small letters.
     In a user's file only the material asked for is looked at: a mistake elsewhere is no matter.
     """
-    path, own = _find_table(name)
-    return _make_own(path, own, _read_tables(path))
+    path, material_name = _find_table(name)
+    return _make_own(path, material_name, _read_tables(path))

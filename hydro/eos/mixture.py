@@ -157,8 +157,8 @@ class Mixture(EquationOfState):
     @property
     def parameters(self) -> tuple:
         """The numbers of both materials and their usual densities; with fields, these last."""
-        found = (self.first.parameters, self.second.parameters, self.usual_densities)
-        return found if self.fields is None else (*found, self.fields)
+        parameters = (self.first.parameters, self.second.parameters, self.usual_densities)
+        return parameters if self.fields is None else (*parameters, self.fields)
 
     @property
     def wave_law(self) -> tuple[float, float, float]:
@@ -168,9 +168,9 @@ class Mixture(EquationOfState):
 
     def with_fields(self, fields: np.ndarray) -> Self:
         """The same for cells with these mass and volume fractions (2, ...)."""
-        found = copy.copy(self)
-        object.__setattr__(found, "fields", (fields[MASS_FRACTION], fields[VOLUME_FRACTION]))
-        return found
+        mixture = copy.copy(self)
+        object.__setattr__(mixture, "fields", (fields[MASS_FRACTION], fields[VOLUME_FRACTION]))
+        return mixture
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__

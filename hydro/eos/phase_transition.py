@@ -48,15 +48,15 @@ P_COMPLETE = 12
 def second_hugoniot(eta, parameters):
     """Pressure of the second phase behind a shock from the first at rest, and its slope in eta."""
     ratio = parameters[SECOND_RHO0] / parameters[PARAMETER_RHO0]
-    own = 1.0 - ratio * (1.0 - eta)
-    narrowing = 1.0 / (1.0 - parameters[S_SECOND] * own)
+    denominator = 1.0 - ratio * (1.0 - eta)
+    narrowing = 1.0 / (1.0 - parameters[S_SECOND] * denominator)
     modulus = parameters[SECOND_RHO0] * parameters[C_SECOND] * parameters[C_SECOND]
     modulus = modulus * narrowing * narrowing
-    pressure = modulus * own
-    slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * own)
+    pressure = modulus * denominator
+    slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * denominator)
     half = 0.5 * parameters[GRUNEISEN_SECOND]
-    above = pressure * (1.0 - half * own)
-    above_slope = ratio * (slope * (1.0 - half * own) - half * pressure)
+    above = pressure * (1.0 - half * denominator)
+    above_slope = ratio * (slope * (1.0 - half * denominator) - half * pressure)
     below = 1.0 / (1.0 - ratio * half * eta)
     return above * below, (above_slope + above * ratio * half * below) * below
 
@@ -221,12 +221,14 @@ class PhaseTransition(EquationOfState):
         ratio = self.rho0_second / self.rho0
         numbers = tuple(float(value) for value in astuple(self))
         # limits of the second Hugoniot: of its compression and of its energy
-        most = min(1.0 - (1.0 - 1.0 / self.s_second) / ratio, 2.0 / (ratio * self.gruneisen_second))
+        limit = min(
+            1.0 - (1.0 - 1.0 / self.s_second) / ratio, 2.0 / (ratio * self.gruneisen_second)
+        )
         low, high = 1.0 - 1.0 / ratio, 1.0 - 1.0 / ratio
-        while second_hugoniot(high, numbers)[0] < self.complete and most - high > 1e-9:
-            low, high = high, high + 0.1 * (most - high)
+        while second_hugoniot(high, numbers)[0] < self.complete and limit - high > 1e-9:
+            low, high = high, high + 0.1 * (limit - high)
         if second_hugoniot(high, numbers)[0] < self.complete:
-            return start, most
+            return start, limit
         return start, find_root(
             lambda eta: second_hugoniot(eta, numbers)[0] - self.complete, low, high, xtol=1e-15
         )

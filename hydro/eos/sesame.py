@@ -71,12 +71,12 @@ def read_sesame(path: str | Path) -> dict[int, SesameTable]:
     at = 0
     while at < len(lines) and lines[at].split() and lines[at].split()[0] != "2":
         at, material, record, words = _read_record(path, lines, at)
-        found = records.setdefault(material, {})
+        tables = records.setdefault(material, {})
         if words is not None:
-            found[record] = words
+            tables[record] = words
     if not records:
         raise BadInput(f"{path}: there is no record of a SESAME table in it")
-    return {number: _make_table(path, number, found) for number, found in records.items()}
+    return {number: _make_table(path, number, tables) for number, tables in records.items()}
 
 
 def _read_record(
@@ -186,13 +186,13 @@ def choose_energies(rho0: float, rho: np.ndarray, energy: np.ndarray) -> np.ndar
 def follow_line(at: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """y at the places `at` of the polyline through (x, y), whose first and last piece go on."""
     piece = np.clip(np.searchsorted(x, at, side="right") - 1, 0, x.size - 2)
-    part = (at - x[piece]) / (x[piece + 1] - x[piece])
-    return y[piece] + part * (y[piece + 1] - y[piece])
+    fraction = (at - x[piece]) / (x[piece + 1] - x[piece])
+    return y[piece] + fraction * (y[piece + 1] - y[piece])
 
 
 def find_first_rising(p: np.ndarray) -> int:
     """The first row from which on p (n, m) rises along both axes up to the last row."""
-    good = (np.diff(p, axis=1) > 0.0).all(axis=1)
-    good[:-1] &= (np.diff(p, axis=0) > 0.0).all(axis=1)
-    bad = np.flatnonzero(~good)
-    return int(bad[-1]) + 1 if bad.size else 0
+    is_rising = (np.diff(p, axis=1) > 0.0).all(axis=1)
+    is_rising[:-1] &= (np.diff(p, axis=0) > 0.0).all(axis=1)
+    not_rising = np.flatnonzero(~is_rising)
+    return int(not_rising[-1]) + 1 if not_rising.size else 0

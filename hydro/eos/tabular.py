@@ -205,18 +205,20 @@ class Tabular(EquationOfState):
         slope = 0.25 * (min(max(gamma, 1.05), 7.0) + 1.0)
         return slope, slope, 0.0
 
-    def _check(self, found, rho, other, name: str):
-        bad = ~np.isfinite(found)
-        if np.any(bad):
-            rho, other = (np.broadcast_to(value, np.shape(found)) for value in (rho, other))
-            first_bad = np.argmax(bad)
+    def _check(self, values, rho, second_argument, name: str):
+        is_bad = ~np.isfinite(values)
+        if np.any(is_bad):
+            rho, second_argument = (
+                np.broadcast_to(value, np.shape(values)) for value in (rho, second_argument)
+            )
+            first_bad = np.argmax(is_bad)
             unit = {"e": "J/kg", "p": "Pa"}[name]
             failure = self.failure.removeprefix("its state is ")
             raise BadInput(
                 f"the state rho = {np.ravel(rho)[first_bad]:g} kg/m3, {name} = "
-                f"{np.ravel(other)[first_bad]:g} {unit} is {failure}"
+                f"{np.ravel(second_argument)[first_bad]:g} {unit} is {failure}"
             )
-        return found
+        return values
 
     def pressure(self, rho, e):
         """Pressure [Pa]; BadInput outside the table."""

@@ -37,8 +37,8 @@ def find_isentrope(eos: Any, rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         (rho < eos.rho0, float(np.min(rho, initial=eos.rho0))),
     ):
         if np.any(chosen):
-            found = integrate_isentrope(eos, round_outwards(end / eos.rho0))
-            energies[chosen], logarithms = found(rho[chosen])
+            isentrope = integrate_isentrope(eos, round_outwards(end / eos.rho0))
+            energies[chosen], logarithms = isentrope(rho[chosen])
             temperatures[chosen] = REST_TEMPERATURE * np.exp(logarithms)
     return energies, temperatures
 
@@ -62,7 +62,7 @@ def integrate_isentrope(eos: Any, ratio: float) -> Any:
         return p / rho**2, gruneisen / rho
 
     span = eos.rho0, ratio * eos.rho0
-    found = solve_ivp(
+    solution = solve_ivp(
         slopes,
         span,
         (0.0, 0.0),
@@ -70,4 +70,4 @@ def integrate_isentrope(eos: Any, ratio: float) -> Any:
         atol=(1e-6 * step, 1e-12),
         dense_output=True,
     )
-    return found.sol
+    return solution.sol

@@ -58,15 +58,15 @@ class Facets(NamedTuple):
     states: np.ndarray
 
 
-def make_facets(most: int, curved: bool) -> Facets:
-    """Arrays for `most` facets; curved: axisymmetric flow."""
-    faces = np.zeros((GEOMETRY_ROWS, most))
+def make_facets(count: int, curved: bool) -> Facets:
+    """Arrays for `count` facets; curved: axisymmetric flow."""
+    faces = np.zeros((GEOMETRY_ROWS, count))
     return Facets(
-        owners=np.zeros((2, most), dtype=np.int64),
-        ends=np.zeros((END_ROWS, most)),
+        owners=np.zeros((2, count), dtype=np.int64),
+        ends=np.zeros((END_ROWS, count)),
         faces=faces,
-        areas=np.zeros((AREA_ROWS, most)) if curved else faces[AREAS],
-        states=np.zeros((CONTACT_ROWS, most)),
+        areas=np.zeros((AREA_ROWS, count)) if curved else faces[AREAS],
+        states=np.zeros((CONTACT_ROWS, count)),
     )
 
 

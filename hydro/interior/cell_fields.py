@@ -28,13 +28,13 @@ def check_first_state(
     rho, _, _, p = state
     for first in range(0, len(rho), SLAB_ROWS):
         rows = slice(first, first + SLAB_ROWS)
-        own = eos if fields is None else eos.with_fields(fields[:, rows])
+        eos_of_rows = eos if fields is None else eos.with_fields(fields[:, rows])
         with np.errstate(all="ignore"):
-            c = own.sound_speed(rho[rows], p[rows])
-        bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
-        if not bad.any():
+            c = eos_of_rows.sound_speed(rho[rows], p[rows])
+        is_bad = ~(np.isfinite(state[:, rows]).all(axis=0) & (rho[rows] > 0.0) & (c > 0.0))
+        if not is_bad.any():
             continue
-        i, j = (int(index) for index in np.argwhere(bad)[0])
+        i, j = (int(index) for index in np.argwhere(is_bad)[0])
         i += first
         raise BadInput(
             f"block {name!r}: cell i={i}, j={j} starts with density {rho[i, j]:g} and "

@@ -62,9 +62,9 @@ class Blocks(list[Block]):
         number = 0
         reason = None
         for number in self.own:
-            *row, good = scan(number)
+            *row, is_valid = scan(number)
             rows.append(row)
-            if not good and (reason := self[number].find_failure()):
+            if not is_valid and (reason := self[number].find_failure()):
                 break
         return self.exchange_new_states(rows, number, reason)
 
@@ -93,10 +93,6 @@ class Blocks(list[Block]):
 
     def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         """A row of `width` numbers for every block, from those of one's own blocks."""
-        return rows
-
-    def exchange_pieces(self, rows: Sequence[Row], width: int) -> Table:
-        """A row of `width` numbers for every piece, in the order of blocks and rows of cells."""
         return rows
 
     def bring_starts(self, sounds: Sequence[bool], fields: Sequence[bool]) -> None:

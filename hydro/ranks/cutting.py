@@ -176,15 +176,15 @@ class CutBlock:
         me = self.group.rank
         requests = []
         for tag, plane in enumerate(array.reshape(-1, *array.shape[-2:])):
-            for other in range(len(self.bands)):
-                if other == me:
+            for other_rank in range(len(self.bands)):
+                if other_rank == me:
                     continue
-                first, last = _find_common(have[other], need[me])
+                first, last = _find_common(have[other_rank], need[me])
                 if first < last:
-                    requests.append(self.group.Irecv(plane[first:last], source=other, tag=tag))
-                first, last = _find_common(have[me], need[other])
+                    requests.append(self.group.Irecv(plane[first:last], source=other_rank, tag=tag))
+                first, last = _find_common(have[me], need[other_rank])
                 if first < last:
-                    requests.append(self.group.Isend(plane[first:last], dest=other, tag=tag))
+                    requests.append(self.group.Isend(plane[first:last], dest=other_rank, tag=tag))
         for request in requests:
             request.Wait()
 
@@ -242,8 +242,8 @@ class CutBlock:
 
     def bring_failed(self) -> None:
         """Send the owner the new states of all cells, where they are not admissible."""
-        good = self.is_owner and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
-        if not self.group.bcast(good, root=0):
+        is_valid = self.is_owner and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
+        if not self.group.bcast(is_valid, root=0):
             self.gather_rows(self.block.state_new)
 
     # --- squeezed cells --------------------------------------------------------------------------

@@ -74,13 +74,13 @@ class Ranks(Blocks):
         self.owners = [there[0] for there in places]
         self.own = [n for n, r in enumerate(self.owners) if r == self.rank]
         by_rank = [[n for n, r in enumerate(self.owners) if r == k] for k in range(self.size)]
-        self._order = [n for own in by_rank for n in own]
-        self._own_counts = [len(own) for own in by_rank]
+        self._order = [n for numbers in by_rank for n in numbers]
+        self._own_counts = [len(numbers) for numbers in by_rank]
         self.bounds = _find_all_bounds(blocks, places, bounds)
         self.cuts: dict[int, CutBlock] = {}
         self._find_pieces(comm)
         self._make_messages()
-        self._starts: messages.Message | None = None  # where a body source acts
+        self._start_copies: messages.Message | None = None  # where a body source acts
         self._pushes: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
         self.whole = True  # is the inside of all blocks that of this step here?
@@ -91,13 +91,12 @@ class Ranks(Blocks):
 
     def _find_pieces(self, comm: Any) -> None:
         """Whose rows are whose; the communicators of blocks that are cut."""
-        every = [
+        all_pieces = [
             (rank, Piece(number, *rows))
             for number, there in enumerate(self.places)
             for rank, rows in zip(there, pairwise(self.bounds[number]), strict=True)
         ]
-        self.pieces = [piece for rank, piece in every if rank == self.rank]
-        self._ranks_of_pieces = [rank for rank, _ in every]
+        self.pieces = [piece for rank, piece in all_pieces if rank == self.rank]
         for number, there in enumerate(self.places):
             if len(there) > 1:
                 inside = self.rank in there
@@ -148,8 +147,11 @@ class Ranks(Blocks):
 
     def _make_polygons(self, number: int, cut: CutBlock) -> messages.Message:
         """A message among the ranks of a cut block alone."""
-        parts = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
-        items = [messages.Item(number, rank, part) for rank, part in enumerate(parts)]
+        parts_of_ranks = [_find_polygon_parts(cut.block, rows) for rows in cut.bands]
+        items = [
+            messages.Item(number, rank, parts_of_rank)
+            for rank, parts_of_rank in enumerate(parts_of_ranks)
+        ]
         return messages.Message(cut.group, self, items)
 
     def _make(self, kind: str, parts: list, width: int = 0) -> messages.Message:
@@ -170,9 +172,9 @@ class Ranks(Blocks):
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
     def exchange_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
-        found = self._exchange(self._nodes, rows, number, failure)
-        if found is not None:
-            raise found
+        rows_of_blocks = self._exchange(self._nodes, rows, number, failure)
+        if rows_of_blocks is not None:
+            raise rows_of_blocks
         for cut in self.cuts.values():
             cut.send_nodes()
         return self._nodes.get_rows()
@@ -180,9 +182,9 @@ class Ranks(Blocks):
     def exchange_new_states(
         self, rows: Sequence[Row], number: int, failure: RunFailure | None
     ) -> Table:
-        found = self._exchange(self._new_states, rows, number, failure)
-        if found is not None:
-            raise found
+        rows_of_blocks = self._exchange(self._new_states, rows, number, failure)
+        if rows_of_blocks is not None:
+            raise rows_of_blocks
         self._take_sums()
         for cut in self.cuts.values():
             cut.exchange_ghost_rows()
@@ -198,33 +200,22 @@ class Ranks(Blocks):
                 self[number].totals.read_array()
 
     def exchange_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
-        if self._starts is None:
+        if self._start_copies is None:
             self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
             pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
             parts = [[*_find_starts(block), push] for block, push in zip(self, pushed, strict=True)]
-            self._starts = self._make("sources", parts)
+            self._start_copies = self._make("sources", parts)
         for number, push in zip(self.own, pushes, strict=True):
             self._pushes[number][...] = push
-        self._starts.exchange()
+        self._start_copies.exchange()
         return self._pushes
 
     def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         table = self._gather_table(rows, width, self._own_counts)
-        found: list[list[float]] = [[]] * len(self)
+        rows_of_blocks: list[list[float]] = [[]] * len(self)
         for number, row in zip(self._order, table, strict=True):
-            found[number] = row
-        return found
-
-    def exchange_pieces(self, rows: Sequence[Row], width: int) -> Table:
-        ranks = self._ranks_of_pieces
-        counts = [ranks.count(k) for k in range(self.size)]
-        table = self._gather_table(rows, width, counts)
-        at = [sum(counts[:k]) for k in range(self.size)]
-        found = []
-        for rank in ranks:  # a rank's pieces are in the order of the blocks
-            found.append(table[at[rank]])
-            at[rank] += 1
-        return found
+            rows_of_blocks[number] = row
+        return rows_of_blocks
 
     def _gather_table(self, rows: Sequence, width: int, counts: Sequence[int]) -> list[list[float]]:
         """Rows of `width` numbers of all ranks, `counts` of each, the first rank's first."""
@@ -296,9 +287,9 @@ class Ranks(Blocks):
         self.busy = True
         if self.rank == 0:
             tell(self.comm, COUNT)
-        found = self.book.gather()
+        counts = self.book.gather()
         self.busy = False
-        return found
+        return counts
 
     def _list_kept(self, number: int) -> list[tuple[int, int, str, tuple[int, int]]]:
         """Who has what of a block: rank, tag of the message, name of an array, and its rows.
@@ -306,15 +297,15 @@ class Ranks(Blocks):
         Nodes are the owner's alone; of other arrays each rank has the rows of its band.
         """
         block = self[number]
-        found = []
+        kept = []
         for tag, name in enumerate(block.step_arrays, MOST_KEPT_ARRAYS * number):
             if name == "nodes":
-                found.append((self.owners[number], tag, name, (0, block.ni + 1)))
+                kept.append((self.owners[number], tag, name, (0, block.ni + 1)))
                 continue
             shift = block.count_ghosts(getattr(block, name))
             for rank, rows in zip(self.places[number], pairwise(self.bounds[number]), strict=True):
-                found.append((rank, tag, name, (rows[0] + shift, rows[1] + shift)))
-        return found
+                kept.append((rank, tag, name, (rows[0] + shift, rows[1] + shift)))
+        return kept
 
     def _leave_inside(self, number: int) -> None:
         """Give back the memory of cells and nodes that other ranks have; rings stay."""
@@ -339,10 +330,10 @@ class Ranks(Blocks):
             empty = np.zeros(array.shape)  # pages that nobody writes to take no memory
             if (ring := rings.get(name)) is not None:
                 empty.reshape(-1)[ring] = array.reshape(-1)[ring]
-            more = array.shape[-2] - block.ni if last > 0 else 0
-            empty[..., first : last + more, :] = array[..., first : last + more, :]
+            ghosts = array.shape[-2] - block.ni if last > 0 else 0
+            empty[..., first : last + ghosts, :] = array[..., first : last + ghosts, :]
             setattr(block, name, empty)
-        block.part_start(parted)
+        block.use_start_copies(parted)
 
 
 def tell(comm: Any, word: int, code: int = 0) -> None:

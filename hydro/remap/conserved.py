@@ -136,7 +136,7 @@ LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must lea
 FILTERS = (minimum_filter, maximum_filter)
 BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
 LOCATED_CELLS_CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
-PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
+SLOPE_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
 MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
@@ -185,7 +185,7 @@ def limit_slopes_to_states(
     corners = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
     rows = [
         *means, *slopes[0], *slopes[1], *least, *greatest, LEAST_LEFT * state[RHO],
-        LEAST_LEFT * stiffness, *(way for corner in corners for way in corner - centres),
+        LEAST_LEFT * stiffness, *(offset for corner in corners for offset in corner - centres),
     ]  # fmt: skip
     cells = np.array(rows).reshape(len(rows), -1)
     factor = np.empty(cells.shape[1])
@@ -197,11 +197,11 @@ def limit_slopes_to_states(
 
 
 def _find_slope_fractions(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
-    """The largest of PARTS (n,) with which all corners of the cells (rows, n) are states."""
+    """The largest of SLOPE_FRACTIONS (n,) with which all corners of cells (rows, n) are states."""
     to_pressure = make_conversion(type(eos)).to_pressure
     factor = np.zeros(cells.shape[1])
     waiting = np.arange(cells.shape[1])
-    for fraction in PARTS:
+    for fraction in SLOPE_FRACTIONS:
         means = cells[0:4]
         slope_x = cells[4:8]
         slope_y = cells[8:12]
@@ -228,11 +228,11 @@ def _find_slope_fractions(eos: EquationOfState, cells: np.ndarray) -> np.ndarray
 
 def check_convex(name: str, nodes: np.ndarray) -> None:
     """Raise BadInput for a grid (2, ni+1, nj+1) with a cell that cannot be cut: not convex."""
-    bad = find_bad_cells(nodes)
-    if len(bad):
-        i, j = (int(index) for index in bad[0])
+    bad_cells = find_bad_cells(nodes)
+    if len(bad_cells):
+        i, j = (int(index) for index in bad_cells[0])
         raise BadInput(
-            f"block {name!r}: {say_not_convex(len(bad))} (the first is i={i}, j={j}), and "
+            f"block {name!r}: {say_not_convex(len(bad_cells))} (the first is i={i}, j={j}), and "
             "what they hold cannot be laid on another grid; take an earlier restart point or dump"
         )
 

@@ -77,9 +77,9 @@ def sample_grid(old: np.ndarray, sides: dict[str, np.ndarray]) -> np.ndarray:
     along_j = [find(sides[s], old[:, e, :]) for s, e in zip(names_j, ends, strict=True)]
     part_i = np.linspace(0.0, 1.0, along_i[0].size)[:, None]
     part_j = np.linspace(0.0, 1.0, along_j[0].size)[None, :]
-    first = along_i[0][:, None] * (1.0 - part_j) + along_i[1][:, None] * part_j
-    second = along_j[0][None, :] * (1.0 - part_i) + along_j[1][None, :] * part_i
-    return np.array([first, second])
+    along_i_mixed = along_i[0][:, None] * (1.0 - part_j) + along_i[1][:, None] * part_j
+    along_j_mixed = along_j[0][None, :] * (1.0 - part_i) + along_j[1][None, :] * part_i
+    return np.array([along_i_mixed, along_j_mixed])
 
 
 NEW_GRID_PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
@@ -314,7 +314,7 @@ class Refinement:
         """After a step, where in numbers of the present columns the new lines lie; None: stay."""
         if step % STEPS_PER_LINE_CHECK:
             return None
-        lines = [line for line in lines if line.segment.kind == "interface"]
+        lines = [line for line in lines if line.segment.is_thick]
         count = lines[0].segment.block.nj
         # by column, over all lines: above 1 where it is too long or bends too sharply (F12.6)
         split_score = np.zeros(count)
@@ -406,10 +406,10 @@ def measure_line(line: Line) -> tuple[np.ndarray, np.ndarray]:
     return np.hypot(*np.diff(nodes, axis=1)), np.abs(measure_turns(longer))
 
 
-def pick_largest(scores: np.ndarray, most: int) -> np.ndarray:
-    """Indices of the `most` largest scores above 1, and of those that equal the least of them."""
+def pick_largest(scores: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the `count` largest scores above 1, and of those that equal the least of them."""
     above = np.flatnonzero(scores > 1.0)
-    if most < 1 or above.size <= most:
-        return above if most >= 1 else above[:0]
-    smallest_picked = np.sort(scores[above])[-most]
+    if count < 1 or above.size <= count:
+        return above if count >= 1 else above[:0]
+    smallest_picked = np.sort(scores[above])[-count]
     return above[scores[above] >= smallest_picked * (1.0 - MIRROR_TIE)]

@@ -34,27 +34,27 @@ def cut_polygon(x, y, n, out_x, out_y, line):
 
     line: a point on it and its direction.
     """
-    from_x, from_y, way_x, way_y = line
+    from_x, from_y, direction_x, direction_y = line
     count = 0
     outside = False
     before_x, before_y = x[n - 1], y[n - 1]
-    before = way_x * (before_y - from_y) - way_y * (before_x - from_x)
+    height_before = direction_x * (before_y - from_y) - direction_y * (before_x - from_x)
     for k in range(n):
         here_x, here_y = x[k], y[k]
-        here = way_x * (here_y - from_y) - way_y * (here_x - from_x)
-        if (before < 0.0 and here > 0.0) or (before > 0.0 and here < 0.0):
-            part = before / (before - here)
-            out_x[count] = before_x + part * (here_x - before_x)
-            out_y[count] = before_y + part * (here_y - before_y)
+        height = direction_x * (here_y - from_y) - direction_y * (here_x - from_x)
+        if (height_before < 0.0 and height > 0.0) or (height_before > 0.0 and height < 0.0):
+            fraction = height_before / (height_before - height)
+            out_x[count] = before_x + fraction * (here_x - before_x)
+            out_y[count] = before_y + fraction * (here_y - before_y)
             count += 1
-        if here >= 0.0:
+        if height >= 0.0:
             out_x[count], out_y[count] = here_x, here_y
             count += 1
         else:
             outside = True
         before_x = here_x
         before_y = here_y
-        before = here
+        height_before = height
     return count, outside
 
 
@@ -73,8 +73,8 @@ def measure_polygon(x, y, n, curved, about_x, about_y):
         bx, by = x[k + 1] - first_x, y[k + 1] - first_y
         area = 0.5 * (ax * by - ay * bx)
         if curved:
-            third = area * (first_y + (ay + by) / 3.0)  # the mean radius
-            volume += third
+            triangle_volume = area * (first_y + (ay + by) / 3.0)  # the mean radius
+            volume += triangle_volume
             radii = 3.0 * first_y + ay + by
             a_y = first_y + ay
             b_y = first_y + by
@@ -91,7 +91,7 @@ def measure_polygon(x, y, n, curved, about_x, about_y):
 
 
 @compiled_once
-def read_cell(nodes, i, j, x, y):
+def read_corners(nodes, i, j, x, y):
     """The corners of the cell i, j into the rows x, y (4,), anticlockwise from its own node."""
     x[0], y[0] = nodes[0, i, j], nodes[1, i, j]
     x[1], y[1] = nodes[0, i + 1, j], nodes[1, i + 1, j]
@@ -105,7 +105,7 @@ def fill_cell_moments(nodes, curved, volumes, centres):
     x, y = np.empty(4), np.empty(4)
     for i in range(volumes.shape[0]):
         for j in range(volumes.shape[1]):
-            read_cell(nodes, i, j, x, y)
+            read_corners(nodes, i, j, x, y)
             volume, moment_x, moment_y = measure_polygon(x, y, 4, curved, x[0], y[0])
             volumes[i, j] = volume
             centres[0, i, j] = x[0] + moment_x / volume
@@ -148,8 +148,8 @@ def _continue_line(means: np.ndarray) -> np.ndarray:
     """What comes before means [0], [1], ..., from the first three, or two where there are two."""
     rise = means[0] - means[1]
     before = means[1] - means[2] if len(means) > 2 else rise
-    least = np.minimum(np.abs(rise), STEEPEST_CONTINUATION * np.abs(before))
-    return means[0] + np.where(rise * before > 0.0, np.sign(rise) * least, 0.0)
+    step = np.minimum(np.abs(rise), STEEPEST_CONTINUATION * np.abs(before))
+    return means[0] + np.where(rise * before > 0.0, np.sign(rise) * step, 0.0)
 
 
 @kernel
@@ -170,19 +170,22 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
             for q in range(count):
                 fields[i, j, q, SLOPE_X] = 0.0
                 fields[i, j, q, SLOPE_Y] = 0.0
-            for k in range(max(i - 1, 0), min(i + 2, ni)):
-                for m in range(max(j - 1, 0), min(j + 2, nj)):
-                    if k == i and m == j:
+            for other_i in range(max(i - 1, 0), min(i + 2, ni)):
+                for other_j in range(max(j - 1, 0), min(j + 2, nj)):
+                    if other_i == i and other_j == j:
                         continue
-                    way_x, way_y = centres[0, k, m] - x, centres[1, k, m] - y
-                    weight = 1.0 / (way_x * way_x + way_y * way_y)
-                    xx += weight * way_x * way_x
-                    xy += weight * way_x * way_y
-                    yy += weight * way_y * way_y
+                    offset_x, offset_y = (
+                        centres[0, other_i, other_j] - x,
+                        centres[1, other_i, other_j] - y,
+                    )
+                    weight = 1.0 / (offset_x * offset_x + offset_y * offset_y)
+                    xx += weight * offset_x * offset_x
+                    xy += weight * offset_x * offset_y
+                    yy += weight * offset_y * offset_y
                     for q in range(count):
-                        rise = weight * (means[q, k, m] - means[q, i, j])
-                        fields[i, j, q, SLOPE_X] += rise * way_x
-                        fields[i, j, q, SLOPE_Y] += rise * way_y
+                        rise = weight * (means[q, other_i, other_j] - means[q, i, j])
+                        fields[i, j, q, SLOPE_X] += rise * offset_x
+                        fields[i, j, q, SLOPE_Y] += rise * offset_y
             # solved; then lessened until no corner is beyond the means around it (F12.3)
             inverse = 1.0 / (xx * yy - xy * xy)
             for q in range(count):
@@ -193,13 +196,15 @@ def fill_linear_fields(means, nodes, centres, least, greatest, fields):
                 limit = 1.0
                 for a in range(2):
                     for b in range(2):
-                        k = i + a
-                        m = j + b
-                        change = slope_x * (nodes[0, k, m] - x) + slope_y * (nodes[1, k, m] - y)
+                        other_i = i + a
+                        other_j = j + b
+                        change = slope_x * (nodes[0, other_i, other_j] - x) + slope_y * (
+                            nodes[1, other_i, other_j] - y
+                        )
                         if change > 0.0:
-                            limit = min(limit, (greatest[q, k, m] - mean) / change)
+                            limit = min(limit, (greatest[q, other_i, other_j] - mean) / change)
                         elif change < 0.0:
-                            limit = min(limit, (least[q, k, m] - mean) / change)
+                            limit = min(limit, (least[q, other_i, other_j] - mean) / change)
                 fields[i, j, q, MEAN] = mean
                 fields[i, j, q, SLOPE_X] = limit * slope_x
                 fields[i, j, q, SLOPE_Y] = limit * slope_y
@@ -253,13 +258,13 @@ def cut_by_cell(work, nodes, i, j, x, y):
 
 
 @compiled_once
-def find_cell(nodes, i, j, x, y, most):
+def locate_point(nodes, i, j, x, y, most_moves):
     """Walk from the cell i, j to the one that holds the point, or to the side that is in the way.
 
-    Each move goes through an edge that the point lies beyond, at most `most` times.
+    Each move goes through an edge that the point lies beyond, at most `most_moves` times.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    for _ in range(most):
+    for _ in range(most_moves):
         ax, ay = nodes[0, i, j], nodes[1, i, j]
         bx, by = nodes[0, i + 1, j], nodes[1, i + 1, j]
         cx, cy = nodes[0, i + 1, j + 1], nodes[1, i + 1, j + 1]
@@ -281,10 +286,10 @@ def find_cell(nodes, i, j, x, y, most):
 def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
     """Cut a new cell by the cells in the queue and by their neighbours that it reaches.
 
-    cell: its corners x, y (4,) and centre `here` (2,); old: nodes, centres and fields of the old
+    cell: its corners x, y (4,) and centre `centre` (2,); old: nodes, centres and fields of the old
     grid; adds to `out`: taken (n,), covered (3,) and used (ni, nj, 3).
     """
-    x, y, here = cell
+    x, y, centre = cell
     nodes, centres, fields = old
     marks, queue, work = scratch
     taken, covered, used = out
@@ -310,8 +315,8 @@ def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
         used[i, j, 1] += moment_x
         used[i, j, 2] += moment_y
         covered[0] += volume
-        covered[1] += moment_x + (about_x - here[0]) * volume
-        covered[2] += moment_y + (about_y - here[1]) * volume
+        covered[1] += moment_x + (about_x - centre[0]) * volume
+        covered[2] += moment_y + (about_y - centre[1]) * volume
         # the new cell goes on into the neighbours across the edges that it crosses
         if below and j > 0 and marks[i, j - 1] != mark:
             marks[i, j - 1] = mark
@@ -332,14 +337,14 @@ def take_overlaps(waiting, cell, old, curved, mark, scratch, out):
 
 
 @compiled_once
-def queue_missed(nodes, x, y, every, mark, marks, queue):
-    """Queue cells of the sides, or `every` cell, whose box meets that of a new cell."""
+def queue_missed(nodes, x, y, all_cells, mark, marks, queue):
+    """Queue cells of the sides, or `all_cells` cell, whose box meets that of a new cell."""
     ni, nj = marks.shape
     low_x, high_x = min(x[0], x[1], x[2], x[3]), max(x[0], x[1], x[2], x[3])
     low_y, high_y = min(y[0], y[1], y[2], y[3]), max(y[0], y[1], y[2], y[3])
     waiting = 0
     for i in range(ni):
-        step = 1 if every or i == 0 or i == ni - 1 or nj == 1 else nj - 1
+        step = 1 if all_cells or i == 0 or i == ni - 1 or nj == 1 else nj - 1
         for j in range(0, nj, step):
             if marks[i, j] == mark:
                 continue
@@ -375,10 +380,10 @@ def fill_overlaps(old, new, curved, least_gap, scratch, out):
     marks, queue, _ = scratch
     taken, covered, used = out
     ni, nj = centres.shape[1], centres.shape[2]
-    most = 4 * (ni + nj)
+    most_moves = 4 * (ni + nj)
     x = np.empty(4)
     y = np.empty(4)
-    here = np.empty(2)
+    centre = np.empty(2)
     marks[:, :] = -1
     taken[:, :, :] = 0.0
     covered[:, :, :] = 0.0
@@ -389,22 +394,22 @@ def fill_overlaps(old, new, curved, least_gap, scratch, out):
         at_i, at_j = row_i, row_j
         for j in range(taken.shape[1]):
             mark = i * taken.shape[1] + j
-            read_cell(new_nodes, i, j, x, y)
-            here[0] = new_centres[0, i, j]
-            here[1] = new_centres[1, i, j]
-            at_i, at_j = find_cell(nodes, at_i, at_j, here[0], here[1], most)
+            read_corners(new_nodes, i, j, x, y)
+            centre[0] = new_centres[0, i, j]
+            centre[1] = new_centres[1, i, j]
+            at_i, at_j = locate_point(nodes, at_i, at_j, centre[0], centre[1], most_moves)
             if j == 0:
                 row_i, row_j = at_i, at_j
             queue[0] = at_i * nj + at_j
             marks[at_i, at_j] = mark
-            cell = (x, y, here)
-            own = (taken[i, j], covered[i, j], used)
-            take_overlaps(1, cell, old, curved, mark, scratch, own)
+            cell = (x, y, centre)
+            taken_by_cell = (taken[i, j], covered[i, j], used)
+            take_overlaps(1, cell, old, curved, mark, scratch, taken_by_cell)
             # parts that a walk over edges does not reach, such as beside a curved side
             if covered[i, j, 0] < (1.0 - least_gap) * new_volumes[i, j]:
-                every = covered[i, j, 0] == 0.0
-                waiting = queue_missed(nodes, x, y, every, mark, marks, queue)
-                take_overlaps(waiting, cell, old, curved, mark, scratch, own)
+                is_uncovered = covered[i, j, 0] == 0.0
+                waiting = queue_missed(nodes, x, y, is_uncovered, mark, marks, queue)
+                take_overlaps(waiting, cell, old, curved, mark, scratch, taken_by_cell)
 
 
 @dataclass(frozen=True)

@@ -74,13 +74,13 @@ def is_read(i, j, ni, nj, rows):
 def make_predict_rates(geometry: Geometry):
     """Kernel that fills the rates at the start of a step, of a geometry."""
     curved = geometry.curved
-    weigh = make_difference_weights(geometry)
+    compute_difference_weights = make_difference_weights(geometry)
     limit_velocity = make_limit_velocity(limit_gently)
 
     @inlined
     def limit_along(state, measures, length, here, before, after, line):
         """Limited variation of the velocity along a line through three cells (i, j)."""
-        first, second = weigh(measures, length, here, before, after)
+        first, second = compute_difference_weights(measures, length, here, before, after)
         u = state[U, here[0], here[1]]
         v = state[V, here[0], here[1]]
         return limit_velocity(

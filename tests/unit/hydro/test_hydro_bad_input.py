@@ -116,3 +116,16 @@ UNIT = box((0, 0), (1, 1), (8, 6))
 def test_overlapping_blocks_are_bad_input(other, words):
     with pytest.raises(BadInput, match=f"{words}.*may touch, not overlap"):
         make({"a": UNIT, "b": other})
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"limiter": "van-ler"}, "no limiter 'van-ler'.*van-leer"),
+        ({"limiter": None}, "no limiter None.*minmod"),
+        ({"flux": "roe"}, "no flux 'roe'.*hllc, hll"),
+    ],
+)
+def test_limiters_and_fluxes_that_are_none_are_refused(options, words):
+    with pytest.raises(BadInput, match=words):
+        Block("gas", IdealGas(1.4), box((0, 0), (1, 1), (4, 3)), 1.0, 0.0, 0.0, 1.0, **options)

@@ -116,7 +116,8 @@ class Link:
 
 
 def _check_materials(leader: Linked, follower: Linked) -> None:
-    """Raise BadInput where mass passes between two materials, and for a bond of what bears no shear."""
+    """Raise BadInput where mass passes between two materials, and for bonds of what bears no
+    shear."""
     leader_eos = leader.block.eos
     follower_eos = follower.block.eos
     for segment in (leader, follower):

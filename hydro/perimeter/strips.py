@@ -105,55 +105,73 @@ class SideKernels(NamedTuple):
     fill_polygons: Kernel
 
 
+class Strip(NamedTuple):
+    """How the strip of cells along a side lies in its block.
+
+    i, j: its first node; inwards_i, inwards_j, along_i, along_j: the steps to the next nodes
+    inwards and along; cells: how many along; first_face, face_step: the first cell's face on the
+    perimeter and the step to the next one's; face_before, face_after: the faces of the sides at
+    both ends that lie beside the strip's first and last cell.
+    """
+
+    i: int
+    j: int
+    inwards_i: int
+    inwards_j: int
+    along_i: int
+    along_j: int
+    cells: int
+    first_face: int
+    face_step: int
+    face_before: int
+    face_after: int
+
+
 @compiled_once(allocates=False)
 def find_strip(side, ni, nj):
-    """How a side's strip lies in its block of ni × nj cells.
-
-    Where its first cell and node are and the steps inwards and along, as (i, j, i inwards, j
-    inwards, i along, j along); cells along; the first cell's face, the step to the next one's, and
-    the faces of the sides at both ends that lie beside the strip's first and last cell.
-    """
-    along = nj if side < J_MIN else ni
+    """The `Strip` along a side of a block of ni × nj cells."""
+    cells = nj if side < J_MIN else ni
     step = 1 if side == I_MIN or side == J_MAX else -1
-    start = 0 if step > 0 else along
+    start = 0 if step > 0 else cells
     i, j = find_node(side, start, 0, ni, nj)
     i_inwards, j_inwards = find_node(side, start, 1, ni, nj)
     i_along, j_along = find_node(side, start + step, 0, ni, nj)
-    strip = (i, j, i_inwards - i, j_inwards - j, i_along - i, j_along - j)
-    first_face = find_first_face(side, ni, nj) + min(start, along - 1)
+    first_face = find_first_face(side, ni, nj) + min(start, cells - 1)
     # the sides that meet this one at its low and its high end, and which of their ends it is
     low_side = J_MIN if side < J_MIN else I_MIN
     across = ni if side < J_MIN else nj
     their_end = across - 1 if side == I_MAX or side == J_MAX else 0
     low = find_first_face(low_side, ni, nj) + their_end
     high = find_first_face(low_side + 1, ni, nj) + their_end
-    if step > 0:
-        return strip, along, first_face, step, low, high
-    return strip, along, first_face, step, high, low
+    before = low if step > 0 else high
+    after = high if step > 0 else low
+    return Strip(
+        i, j, i_inwards - i, j_inwards - j, i_along - i, j_along - j,
+        cells, first_face, step, before, after,
+    )  # fmt: skip
 
 
 @compiled_once(allocates=False)
 def copy_nodes(nodes, strip, row, start, count, Z, place):
     """A row of a strip's nodes, from `start` on and one to either side of what `count` cells have,
     where there are such, to the rows of the scratch from `place` on."""
-    i, j, di, dj, ki, kj = strip
     first = start - 1 if start > 0 else 0
-    along = (nodes.shape[1] - 1) * abs(ki) + (nodes.shape[2] - 1) * abs(kj)
-    last = min(along, start + count + 1)
-    i, j = i + row * di, j + row * dj
+    last = min(strip.cells, start + count + 1)
+    i, j = strip.i + row * strip.inwards_i, strip.j + row * strip.inwards_j
     for k in range(first, last + 1):
         entry = k - start + 1
-        Z[place + entry] = nodes[0, i + k * ki, j + k * kj]
-        Z[place + SCRATCH_SPAN + entry] = nodes[1, i + k * ki, j + k * kj]
+        Z[place + entry] = nodes[0, i + k * strip.along_i, j + k * strip.along_j]
+        Z[place + SCRATCH_SPAN + entry] = nodes[1, i + k * strip.along_i, j + k * strip.along_j]
 
 
 @compiled_once(allocates=False)
 def find_strip_cell(strip, row, k):
     """Indices (i, j) of the cell k of a row of a strip."""
-    i, j, di, dj, ki, kj = strip
     # the node before which a cell lies is its own where the strip runs upwards
-    i += row * di + k * ki - (1 if di + ki < 0 else 0)
-    j += row * dj + k * kj - (1 if dj + kj < 0 else 0)
+    before_i = 1 if strip.inwards_i + strip.along_i < 0 else 0
+    before_j = 1 if strip.inwards_j + strip.along_j < 0 else 0
+    i = strip.i + row * strip.inwards_i + k * strip.along_i - before_i
+    j = strip.j + row * strip.inwards_j + k * strip.along_j - before_j
     return i, j
 
 
@@ -161,10 +179,11 @@ def find_strip_cell(strip, row, k):
 def copy_state(state, strip, row, start, count, Z, place):
     """A row of a strip's states, with one beyond either end, to the rows from `place` on."""
     i, j = find_strip_cell(strip, row, start)
-    ki, kj = strip[4], strip[5]
     for q in range(STATE_ROWS):
         for k in range(count + 2):
-            Z[place + q * SCRATCH_SPAN + k] = state[q, i + 1 + (k - 1) * ki, j + 1 + (k - 1) * kj]
+            Z[place + q * SCRATCH_SPAN + k] = state[
+                q, i + 1 + (k - 1) * strip.along_i, j + 1 + (k - 1) * strip.along_j
+            ]
 
 
 @functools.cache
@@ -201,13 +220,14 @@ def make_side_kernels(
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
-            strip, along, first_face, step, _, _ = find_strip(side, ni, nj)
+            strip = find_strip(side, ni, nj)
+            step = strip.face_step
             # the strip of cells along a side, in chunks that fit the scratch
             is_deep = (ni if side < J_MIN else nj) > 2
-            for start in range(0, along, scratch.CHUNK_CELLS):
-                m = min(scratch.CHUNK_CELLS, along - start)
+            for start in range(0, strip.cells, scratch.CHUNK_CELLS):
+                m = min(scratch.CHUNK_CELLS, strip.cells - start)
                 n = scratch.count_padded(m)
-                first = first_face + start * step
+                first = strip.first_face + start * step
                 # does any face of the chunk need the next cells inwards?
                 wanted = False
                 for k in range(m):
@@ -247,9 +267,7 @@ def make_side_kernels(
     def load_rows_inwards(state, nodes, strip, start, is_deep, Z):
         """Bring the next cells inwards and those after them (where the block is deep enough) to the
         current row and the one after it; the strip's own lengths become those of the row before."""
-        ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-        along = ni * abs(strip[4]) + nj * abs(strip[5])
-        m = min(scratch.CHUNK_CELLS, along - start)
+        m = min(scratch.CHUNK_CELLS, strip.cells - start)
         n = scratch.count_padded(m)
         for row in range(2, 4 if is_deep else 3):
             next_row(Z, n)
@@ -266,11 +284,12 @@ def make_side_kernels(
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
-            strip, along, first_face, step, before, after = find_strip(side, ni, nj)
-            for start in range(0, along, scratch.CHUNK_CELLS):
-                m = min(scratch.CHUNK_CELLS, along - start)
+            strip = find_strip(side, ni, nj)
+            step = strip.face_step
+            for start in range(0, strip.cells, scratch.CHUNK_CELLS):
+                m = min(scratch.CHUNK_CELLS, strip.cells - start)
                 n = scratch.count_padded(m)
-                first = first_face + start * step
+                first = strip.first_face + start * step
                 # the ghosts, then the strip's own row and the next one
                 for k in range(m):
                     Z[scratch.LENGTH + 1 + k] = rim[LENGTH_GHOST, first + k * step]
@@ -295,8 +314,8 @@ def make_side_kernels(
                         i, j = find_strip_cell(strip, 0, start + k)
                         Z[scratch.STRESS_X + 1 + k] = old[3].pull[0, i, j]
                         Z[scratch.STRESS_Y + 1 + k] = old[3].pull[1, i, j]
-                low = rim[LENGTH_GHOST, before] if start == 0 else -1.0
-                high = rim[LENGTH_GHOST, after] if start + m == along else -1.0
+                low = rim[LENGTH_GHOST, strip.face_before] if start == 0 else -1.0
+                high = rim[LENGTH_GHOST, strip.face_after] if start + m == strip.cells else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)
                 store_predicted(Z, m, nodes, strip, start, first, step, rim)
 

@@ -104,16 +104,17 @@ def put_stress(rim, first, part, k, stress):
 
 @compiled_once(allocates=False)
 def extrapolate_stress(values, state, rim, k, shape):
-    """s_nn at a face, with the slope of the next cell inwards where there is no shock (F4.7)."""
+    """s_nn, s_tt, s_nt at a face, with the slopes of the next cell inwards where there is no shock
+    (theory F4.7)."""
     ni, nj = shape
     side, along = find_face(k, ni, nj)
     nx, ny = find_normal(rim, k)
     i, j = find_node(side, along, 0, ni - 1, nj - 1)
     i_1, j_1 = find_node(side, along, 1, ni - 1, nj - 1)
     i_2, j_2 = find_node(side, along, 2, ni - 1, nj - 1)
-    s_0, _, _ = resolve_cell(values, i, j, nx, ny)
-    s_1, _, _ = resolve_cell(values, i_1, j_1, nx, ny)
-    s_2, _, _ = resolve_cell(values, i_2, j_2, nx, ny)
+    own = resolve_cell(values, i, j, nx, ny)
+    nearer = resolve_cell(values, i_1, j_1, nx, ny)
+    further = resolve_cell(values, i_2, j_2, nx, ny)
     p_0 = state[P, i + 1, j + 1]
     p_1 = state[P, i_1 + 1, j_1 + 1]
     p_2 = state[P, i_2 + 1, j_2 + 1]
@@ -122,7 +123,11 @@ def extrapolate_stress(values, state, rim, k, shape):
     rough = min(max(rough, 0.0), 1.0)
     smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
     part = smooth * (0.5 * rim[LENGTH, k] / rim[DISTANCE_NEXT, k])
-    return s_0 + part * limit_gently(s_0 - s_1, s_1 - s_2)
+    return (
+        own[0] + part * limit_gently(own[0] - nearer[0], nearer[0] - further[0]),
+        own[1] + part * limit_gently(own[1] - nearer[1], nearer[1] - further[1]),
+        own[2] + part * limit_gently(own[2] - nearer[2], nearer[2] - further[2]),
+    )
 
 
 @inlined
@@ -154,31 +159,37 @@ def start_stress(values, state, shear, walls, inwards, first, sides, rim):
             ghost = compose_stress(s_nn, s_tt, -s_nt, nx, ny)
             put_stress(rim, first, CARRIED_GHOST, k, ghost)
     for k in range(rim.shape[1]):
-        _, speed, _ = find_shear_wave(rim, first, k, 0.0, CARRIED_CELL, RHO)
         sides[SHEAR_STRESS, k] = 0.0
-        sides[SPEED_ALONG, k] = speed
         if not inwards[k]:
             continue
         side, i, j = find_cell(k, ni, nj)
+        nx, ny = find_normal(rim, k)
+        s_nn, s_tt, s_nt = resolve_cell(values, i, j, nx, ny)
         deep = (ni if side < 2 else nj) > 2
         if deep and shear[i, j] > 0.0:
-            s_nn = extrapolate_stress(values, state, rim, k, (ni, nj))
-        else:
-            nx, ny = find_normal(rim, k)
-            s_nn, _, _ = resolve_cell(values, i, j, nx, ny)
+            s_nn, s_tt, s_nt = extrapolate_stress(values, state, rim, k, (ni, nj))
+        put_stress(rim, first, CARRIED_TRACE, k, compose_stress(s_nn, s_tt, s_nt, nx, ny))
         c = rim[C_FACE, k]
         rim[C_FACE, k] = add_shear_wave(c * c, shear[i, j], rim[RHO_FACE, k]) ** 0.5
         rim[P_FACE, k] -= s_nn
+        sides[SPEED_ALONG, k] = find_free_speed_along(rim, first, k, shear[i, j], RHO_FACE)
+
+
+@inlined
+def find_free_speed_along(rim, first, k, shear, state):
+    """Speed along a face on which no shear stress acts, from its stress in CARRIED_TRACE."""
+    z, speed, stress = find_shear_wave(rim, first, k, shear, state)
+    return speed - stress / z if z > 0.0 else speed
 
 
 @kernel(allocates=False)
 def fill_stress_ghosts(shear, spans, first, sides, rim):
     """Ghosts beyond contacts and free surfaces, of state and stress, from their contact states.
 
-    spans (n, 2): of faces that go with the flow.  The normal stress changes by twice what it
-    differs from that of the contact, as in an elastic wave along the normal: so much of it by the
-    pressure as c² is of c_l².  Along the face the ghost is as far beyond what `sides` have of the
-    contact as the cell is short of it.  Theory F20.7.
+    spans (n, 2): of faces that go with the flow.  At the face the normal stress changes to that of
+    the contact as in an elastic wave along the normal: so much of it by the pressure as c² is of
+    c_l².  The ghost is as far beyond this as the cell is short of it, in the stress and speed along
+    the face, too.  Theory F20.7.
     """
     ni, nj = shear.shape
     for number in range(spans.shape[0]):
@@ -187,15 +198,23 @@ def fill_stress_ghosts(shear, spans, first, sides, rim):
             nx, ny = find_normal(rim, k)
             s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_CELL, k)
             s_nn, s_tt, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
+            s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_TRACE, k)
+            face_nn, face_tt, _ = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
             c2 = rim[C, k] * rim[C, k]
-            wave_c2 = add_shear_wave(c2, shear[i, j], rim[RHO, k])
-            rise = 2.0 * (rim[P_STAR, k] - (rim[P, k] - s_nn))
-            by_pressure = rise * (c2 / wave_c2)
+            # how the contact changes what is at the face, twice: there and back
+            rise = 2.0 * (rim[P_STAR, k] - rim[P_FACE, k])
+            by_pressure = rise * (c2 / add_shear_wave(c2, shear[i, j], rim[RHO, k]))
             by_stress = rise - by_pressure
-            rim[RHO_GHOST, k] = rim[RHO, k] + rise / wave_c2
-            rim[P_GHOST, k] = rim[P, k] + by_pressure
-            ghost_nt = 2.0 * sides[SHEAR_STRESS, k] - s_nt
-            ghost = compose_stress(s_nn - by_stress, s_tt + 0.5 * by_stress, ghost_nt, nx, ny)
+            p = 2.0 * (rim[P_FACE, k] + face_nn) - rim[P, k] + by_pressure
+            rim[RHO_GHOST, k] = rim[RHO, k] + (p - rim[P, k]) / c2
+            rim[P_GHOST, k] = p
+            ghost = compose_stress(
+                2.0 * face_nn - s_nn - by_stress,
+                2.0 * face_tt - s_tt + 0.5 * by_stress,
+                2.0 * sides[SHEAR_STRESS, k] - s_nt,
+                nx,
+                ny,
+            )
             put_stress(rim, first, CARRIED_GHOST, k, ghost)
             speed = rim[V, k] * nx - rim[U, k] * ny
             more = 2.0 * (sides[SPEED_ALONG, k] - speed)
@@ -237,13 +256,13 @@ def trace_stress_moving(slopes, centres, shear, spans, first, rim):
 
 
 @inlined
-def find_shear_wave(rim, first, k, shear, part, state):
+def find_shear_wave(rim, first, k, shear, state):
     """(z, speed, stress) of `compute_shear_contact` at a face, t being that of its normal.
 
-    part: row of the stress, CARRIED_CELL or CARRIED_TRACE; state: first of the rows rho, u, v.
+    state: first of the rows rho, u, v there; the stress is in the rows CARRIED_TRACE.
     """
     nx, ny = find_normal(rim, k)
-    s_xx, s_yy, s_xy = get_stress(rim, first, part, k)
+    s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_TRACE, k)
     _, _, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
     speed = rim[state + V, k] * nx - rim[state + U, k] * ny
     return (rim[state + RHO, k] * shear) ** 0.5, speed, s_nt
@@ -284,9 +303,8 @@ def trace_stress(shear, plan, wave_law, first, curved, sides, rim):
     for k in range(rim.shape[1]):
         _, i, j = find_cell(k, ni, nj)
         press_with_stress(rim, first, k, shear[i, j])
-        z, speed, stress = find_shear_wave(rim, first, k, shear[i, j], CARRIED_TRACE, RHO_TRACE)
         sides[SHEAR_STRESS, k] = 0.0
-        sides[SPEED_ALONG, k] = speed - stress / z if z > 0.0 else speed
+        sides[SPEED_ALONG, k] = find_free_speed_along(rim, first, k, shear[i, j], RHO_TRACE)
         nx, ny = rim[NX, k], rim[NY, k]
         keep_face_speed(rim, sides, k, rim[SWEEP, k] / (nx * nx + ny * ny) ** 0.5)
     fill_wall_fluxes(rim, walls, wave_law, curved)
@@ -302,7 +320,7 @@ def let_stress_pass(rim, sides, first, k, goes_on, curved):
     """Shear stress at an open face: that of the trace where the solid goes on, else none."""
     nx, ny = find_normal(rim, k)
     if goes_on:
-        _, speed, stress = find_shear_wave(rim, first, k, 0.0, CARRIED_TRACE, RHO_TRACE)
+        _, speed, stress = find_shear_wave(rim, first, k, 0.0, RHO_TRACE)
         sides[SHEAR_STRESS, k] = stress
         sides[SPEED_ALONG, k] = speed
         pull_along(rim, k, stress, speed, curved)
@@ -322,16 +340,15 @@ def stick_together(one, other, pairs, phase, mass_passes, curved):
     first, other_first, step, count = pairs
     ni, nj = shear.shape
     other_ni, other_nj = other_shear.shape
-    part = CARRIED_CELL if phase == AT_CELLS else CARRIED_TRACE
     state = RHO_FACE if phase == AT_CELLS else RHO_TRACE
     for n in range(count):
         k = first + n
         m = other_first + step * n
         _, i, j = find_cell(k, ni, nj)
         _, a, b = find_cell(m, other_ni, other_nj)
-        z, speed, own = find_shear_wave(rim, field, k, shear[i, j], part, state)
+        z, speed, own = find_shear_wave(rim, field, k, shear[i, j], state)
         z_beyond, speed_beyond, beyond = find_shear_wave(
-            other_rim, other_field, m, other_shear[a, b], part, state
+            other_rim, other_field, m, other_shear[a, b], state
         )
         # the other's normal and direction along the face are turned: speeds change their sign
         stress, along = compute_shear_contact((z, speed, own), (z_beyond, -speed_beyond, beyond))

@@ -10,6 +10,7 @@ import pytest
 from builders import box, check_restarts, free, march, wall_off
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
+from shockgrid.hydro.carried.fields import CarriedField
 from shockgrid.hydro.eos import IdealGas, MieGruneisen
 from shockgrid.hydro.formulas.geometry import GEOMETRIES
 from shockgrid.hydro.formulas.strength import (
@@ -267,3 +268,74 @@ def test_what_cannot_be_bonded_is_refused():
         join("interface", (metal, "i_max"), (fluid, "i_min"), bonded=True)
     with pytest.raises(BadInput, match="its strength differs"):
         join("seam", (metal, "i_max"), (fluid, "i_min"))
+
+
+def make_ring(cells=(8, 48), speed=300.0):
+    """A ring that spins in plane strain, in equilibrium under its centrifugal force, elastic."""
+    inner, outer = 0.01, 0.02
+    bulk = 2785.0 * 5328.0**2
+    shear = LAW.modulus
+    poisson = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+    turning = speed / outer
+    force = 2785.0 * turning**2 / (8.0 * (1.0 - poisson))
+    r, angle = np.meshgrid(
+        np.linspace(inner, outer, cells[0] + 1),
+        np.linspace(0.0, 2.0 * np.pi, cells[1] + 1),
+        indexing="ij",
+    )
+    nodes = np.array([r * np.cos(angle), r * np.sin(angle)])
+    nodes[:, :, -1] = nodes[:, :, 0]
+
+    def find_stress(x, y):
+        square = x * x + y * y
+        along = (3.0 - 2.0 * poisson) * force
+        s_r = along * (inner**2 + outer**2 - (inner * outer) ** 2 / square - square)
+        s_t = along * (inner**2 + outer**2 + (inner * outer) ** 2 / square)
+        s_t -= (1.0 + 2.0 * poisson) * force * square
+        p = -(1.0 + poisson) * (s_r + s_t) / 3.0
+        stress = compose_stress(s_r + p, s_t + p, 0.0, x / np.sqrt(square), y / np.sqrt(square))
+        return *stress, p
+
+    fields = [
+        CarriedField(name, "Pa", first=lambda x, y, q=q: find_stress(x, y)[q])
+        for q, name in enumerate(("s_xx", "s_yy", "s_xy"))
+    ]
+    ring = Block(
+        "ring",
+        ALUMINIUM,
+        nodes,
+        lambda x, y: 2785.0 * (1.0 + find_stress(x, y)[3] / bulk),
+        lambda x, y: -turning * y,
+        lambda x, y: turning * x,
+        lambda x, y: find_stress(x, y)[3],
+        strength=Perfect(shear, 1e12),
+        carried=fields,
+    )
+    links = [join("seam", (ring, "j_min"), (ring, "j_max"))]
+    free(ring, "i_min", "i_max")
+    return Simulation([ring], links, t_end=2.0 * np.pi / turning)
+
+
+def spin(cells, end):
+    """Relative loss of a ring's angular momentum until `end`, and its equivalent stress now."""
+    simulation = make_ring(cells)
+    (ring,) = simulation.blocks
+
+    def measure():
+        rho, u, v, _ = ring.get_inside("state")
+        x, y = ring.centres
+        return float(((x * v - y * u) * rho * ring.volume).sum())
+
+    before = measure()
+    while simulation.t < end:
+        simulation.advance()
+    return 1.0 - measure() / before, compute_equivalent(*ring.carried[:3, 1:-1, 1:-1])
+
+
+def test_a_spinning_ring_stays_round_and_goes_on():
+    loss, stress = spin((8, 48), 4e-6)
+    rings = stress.mean(axis=1, keepdims=True)
+    assert np.abs(stress - rings).max() < 6e-3 * stress.max()
+    finer, _ = spin((16, 96), 4e-6)
+    assert abs(loss) < 5e-4
+    assert abs(finer) < abs(loss) / 3.5, "second order at least"

@@ -97,6 +97,10 @@ class FlyingPlateDeck(Deck, kw_only=True):
     places: key(
         tuple[float, ...], "where it is measured [m]; the flyer's back begins at 0", max_length=40
     ) = tuple(ONE_MILLIMETRE * x for x in PROFILE_SPEEDS)
+    trace: key(
+        tuple[tuple[float, float], ...], "measured times [s] and speeds [m/s] of the target's back"
+    ) = ()
+    source: key(str, "who measured it") = "measured"
     limiter: Limiter = DEFAULT_LIMITER
 
 
@@ -208,8 +212,15 @@ class FlyingPlate(Problem):
             found = interpolate(t, history["back_speed"], ONE_MICROSECOND * time)
             label = f"target's back at {time:g} µs [m/s]"
             rows.append(Row(f"back_at_{time:g}", found, theory, label, size=size, source=SOURCE))
+        for time, measured in deck.trace:
+            found = interpolate(t, history["back_speed"], time)
+            label = f"target's back at {time / ONE_MICROSECOND:g} µs [m/s]"
+            name = f"trace_at_{time / ONE_MICROSECOND:g}"
+            rows.append(Row(name, found, measured, label, size=deck.speed, source=deck.source))
         sizes = f"{1e3 * deck.flyer:g} mm at {deck.speed:g} m/s onto {1e3 * deck.target:g} mm"
         note = f"differences of velocities are parts of {size:g} m/s, that behind the shock"
+        if deck.trace:
+            note += ", and beside the measured trace of the flyer's speed"
         return Report(f"flying-plate: {sizes}, {self.cells} cells", rows, [note])
 
     def compare_exact(self, history) -> list[Row]:
@@ -239,6 +250,9 @@ class FlyingPlate(Problem):
         history = run_data.history
         right.plot(history["t"] / ONE_MICROSECOND, history["back_speed"], lw=1.4, label="computed")
         right.set(xlabel="t [µs]", ylabel="target's back [m/s]")
+        if deck.trace:
+            times, speeds = np.transpose(deck.trace)
+            right.plot(times / ONE_MICROSECOND, speeds, "k+", ms=8, label=deck.source)
         if self.is_reference:
             left.plot(list(PROFILE_SPEEDS), list(PROFILE_SPEEDS.values()), "k+", ms=8, label=SOURCE)
             right.plot(list(BACK_SPEEDS), list(BACK_SPEEDS.values()), "k+", ms=8, label=SOURCE)

@@ -133,7 +133,8 @@ def find_fastest_cell(rates, row):
 
 @kernel
 def is_squeezed(crowding, i, j, share, far_out):
-    """Could cell i, j be above `find_most_crowded`?  Not if enough cells are nearly as crowded."""
+    """Whether cell i, j could be above `find_most_crowded`: not if enough cells are nearly as
+    crowded."""
     square = crowding[i, j]
     allowed = int(share * crowding.size)
     count = 0

@@ -58,7 +58,7 @@ def predict(block: Block, dt: float) -> None:
     if block.stress is not None:
         block.stress.predict(block, dt)
     kernels.sides.predict_sides.entry(
-        _list_old(block), 0.5 * dt, block.parameters, block.plan.moving, kernels.scratch,
+        _list_old(block), 0.5 * dt, block.parameters, block.plan.flowing_spans, kernels.scratch,
         block.rim.rows,
     )  # fmt: skip
     if block.stress is not None:

@@ -82,7 +82,7 @@ AREA_CENTRE = slice(X_AREA, Y_AREA + 1)
 FLUX = slice(MASS, HOOP + 1)
 
 
-class Span(Protocol):
+class FaceRange(Protocol):
     """Faces of a rim that follow each other, such as those of a segment."""
 
     first: int
@@ -92,7 +92,7 @@ class Span(Protocol):
 class Rim:
     """Rows of a rim by name: `rim.rho` is the row RHO of `rows` (ROWS, faces).
 
-    `rim[span]` has the faces of a segment alone; its rows are views of the whole.
+    `rim[faces]` has the faces of a segment alone; its rows are views of the whole.
     """
 
     def __init__(self, rows: np.ndarray):
@@ -105,8 +105,8 @@ class Rim:
         setattr(self, name, row)  # found without asking from now on
         return row
 
-    def __getitem__(self, span: Span) -> Rim:
-        return Rim(self.rows[:, span.first : span.last])
+    def __getitem__(self, faces: FaceRange) -> Rim:
+        return Rim(self.rows[:, faces.first : faces.last])
 
     def get_carried(self, carried_row: int) -> np.ndarray:
         """A view (fields, faces) of a row of all carried fields, such as CARRIED_GHOST."""
@@ -170,7 +170,7 @@ def find_ends(face, ni, nj):
 
 
 @compiled_once
-def find_cell(face, ni, nj):
+def find_cell_of_face(face, ni, nj):
     """Side and cell (i, j) of a face of the rim."""
     side, k = find_face(face, ni, nj)
     i, j = find_node(side, k, 0, ni - 1, nj - 1)

@@ -85,7 +85,7 @@ class Joining(Protocol):
     name: str
 
     def is_due(self, t: float) -> bool:
-        """Is it time [s] for it, and has it not been yet?"""
+        """Whether it is time [s] for it, and it has not been done yet."""
         ...
 
     def merge(self, blocks: Sequence[Block]) -> tuple[list[Block], list, Callable[[], object]]:

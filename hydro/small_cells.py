@@ -256,7 +256,7 @@ def make_redistribution(eos_class, geometry: Geometry):
             sizes[MEAN_POSITION, i, j] = moment / volume
 
     @compiled_once
-    def fill_slopes(squeezed, reaches, nodes, record):
+    def fill_neighbourhood_slopes(squeezed, reaches, nodes, record):
         """Slope of each neighbourhood, from the means beyond its ends."""
         amounts, sizes = record
         ni, nj = reaches.shape
@@ -402,7 +402,7 @@ def make_redistribution(eos_class, geometry: Geometry):
                 amounts[SLOPE, q, i, j] = 0.0
         # means and slopes of the neighbourhoods (theory F7.4)
         fill_means(small, reaches, nodes_new, record)
-        fill_slopes(small, reaches, nodes_new, record)
+        fill_neighbourhood_slopes(small, reaches, nodes_new, record)
         least_c2 = 1e300
         changed = 0
         sums = np.empty((3, amounts.shape[1]))

@@ -104,7 +104,8 @@ class Flow:
 
 @dataclass
 class StepRecord:
-    """How a step went: what limited it, how often and why it was cut, is it the end?"""
+    """How a step went: what limited it, how often and why it was retried, and whether it is the
+    last."""
 
     limit: str = ""
     retries: int = 0

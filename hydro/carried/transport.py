@@ -44,7 +44,7 @@ from shockgrid.hydro.rim import (
     X_TRACE,
     Y_TRACE,
     find_carried_row,
-    find_cell,
+    find_cell_of_face,
     find_excess,
 )
 from shockgrid.hydro.rows import RHO, U, V
@@ -75,7 +75,7 @@ def gather(values, rim):
     for q in range(values.shape[0]):
         row = find_carried_row(q)
         for k in range(rim.shape[1]):
-            _, i, j = find_cell(k, ni, nj)
+            _, i, j = find_cell_of_face(k, ni, nj)
             rim[row + CARRIED_CELL, k] = values[q, i + 1, j + 1]
             rim[row + CARRIED_GHOST, k] = values[q, i + 1, j + 1]
 
@@ -246,7 +246,7 @@ def trace(slopes, centres, opened, rim):
     for q in range(slopes.shape[0]):
         row = find_carried_row(q)
         for k in range(rim.shape[1]):
-            _, i, j = find_cell(k, ni, nj)
+            _, i, j = find_cell_of_face(k, ni, nj)
             rim[row + CARRIED_TRACE, k] = find_value(
                 slopes[q], centres, i, j, rim[X_TRACE, k], rim[Y_TRACE, k]
             )

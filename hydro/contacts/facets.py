@@ -69,14 +69,14 @@ def find_groups(old, new, first, stop, boxes, reach, groups):
 
 @compiled_once
 def lies_away(x, y, boxes, g, reach):
-    """Is the point further than `reach` [m] outside the box `g` of `boxes` (4, groups)?"""
+    """Whether the point lies more than `reach` [m] outside the box `g` of `boxes` (4, groups)."""
     beside = x < boxes[LEAST_X, g] - reach or x > boxes[MOST_X, g] + reach
     return beside or y < boxes[LEAST_Y, g] - reach or y > boxes[MOST_Y, g] + reach
 
 
 @compiled_once
 def may_lie_on(part, k, a):
-    """May node `k` lie on face `a`?  In a line that meets itself not on one beside it.
+    """Whether node `k` may lie on face `a`: in a line that meets itself, not on one beside it.
 
     part: BOTH where they are of different lines; in one line, LATER where the node is of its later
     part, the follower, and EARLIER where it is of the other one.
@@ -101,14 +101,14 @@ def find_depth(line, a, x, y):
 
 @compiled_once
 def faces_each_other(line, a, along_x, along_y):
-    """Does face `a` run against a direction of the other line?"""
+    """Whether face `a` runs against a direction of the other line."""
     dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
     return along_x * dx + along_y * dy < 0.0
 
 
 @compiled_once
 def looks_at(points, k, line, a):
-    """Does a face beside node `k` of a line look at face `a` of the other one?
+    """Whether a face beside node `k` of a line faces the face `a` of the other one.
 
     At the corner of a body a node lies on two of its sides, of which it may touch one alone.  Faces
     at a right angle look at each other where the one is in front of the other.
@@ -128,7 +128,7 @@ def looks_at(points, k, line, a):
 
 @compiled_once
 def is_film(inner, k, line, a, x, y):
-    """Is node `k`, at (x, y), on the other side of a film of one body than face `a`?
+    """Whether node `k`, at (x, y), lies on the other side of a film of one body than face `a`.
 
     inner (2, n): the next nodes inwards.  That of a node which has come through the face is in
     front of it, that of one on the film's other side behind.
@@ -139,7 +139,8 @@ def is_film(inner, k, line, a, x, y):
 
 @compiled_once
 def is_round_corner(line, mirrored, a, at, deep):
-    """Is a point, `deep` behind face `a` [m] at the part `at` of it, nearer to the next side?
+    """Whether a point, `deep` [m] behind face `a` at the fraction `at` of it, is nearer to the next
+    side.
 
     So it is at a corner of the other body.  Lines go on where their ends are `mirrored`.
     """
@@ -346,7 +347,8 @@ def follow_pins(points, line, positions, part, found):
 
 @compiled_once
 def goes_before(one, other, next_one, next_other):
-    """Is a pin before the next one: lower on the leader, at one place there higher on the other?"""
+    """Whether a pin comes before the next: lower on the leader, or there alike and higher on the
+    other."""
     return one < next_one or (one == next_one and other > next_other)
 
 
@@ -405,7 +407,7 @@ def merge_pins(leader_positions, follower_positions, pins):
 
 @compiled_once
 def lie_near(points, first, stop, line, a):
-    """Do the points first..stop - 1 lie no further than MOST_BULGE from face `a` of a line?"""
+    """Whether the points first..stop - 1 lie no further than MOST_BULGE from face `a` of a line."""
     for k in range(first, stop):
         _, away = project(line, a, points[0, k], points[1, k])
         if away > MOST_BULGE * MOST_BULGE * measure_square(line, a):

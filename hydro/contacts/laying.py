@@ -100,10 +100,10 @@ def measure_distance_before(mover, k, target, position):
 
 @compiled_once
 def is_laid(k, pins, away, length, back, at_end, ends_line):
-    """Is a node laid on the other line?  See `lay`.
+    """Whether a node is laid on the other line; see `lay`.
 
     away: how far its place is outside it, and beside its foot [m]; length: of the face there;
-    at_end: is it an end of its own line?  ends_line: is its foot an end of the other one?
+    at_end: whether it is an end of its own line; ends_line: whether its foot is one of the other's.
     """
     outside, beside = away
     if back:

@@ -39,7 +39,7 @@ def make_line_nodes(faces: int, group: int) -> LineNodes:
 
 @compiled_once
 def is_free_end(nodes, position):
-    """Is a position on a line its first or last node, beyond which there is nothing of it?"""
+    """Whether a position on a line is its first or last node, beyond which it does not go on."""
     most = nodes.line.shape[1] - 1
     at_start = position == 0.0 and not nodes.mirrored[0]
     return at_start or (position == most and not nodes.mirrored[1])
@@ -47,7 +47,7 @@ def is_free_end(nodes, position):
 
 @compiled_once
 def is_mirrored_end(nodes, position):
-    """Is a position on a line a node on a plane, with the line's mirror image beyond it?"""
+    """Whether a position on a line is a node on a plane, with the line's mirror image beyond it."""
     most = nodes.line.shape[1] - 1
     at_start = position == 0.0 and nodes.mirrored[0]
     return at_start or (position == most and nodes.mirrored[1])

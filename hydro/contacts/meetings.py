@@ -242,7 +242,8 @@ class Meetings:
                 self._lay_line(pair, False, part_back)
 
     def _lay_line(self, pair: Pair, back: bool, part_back: float) -> bool:
-        """Lay the follower's nodes on the leader, or with `back` the leader's; has any moved?"""
+        """Lay the follower's nodes on the leader, or with `back` the leader's; returns whether any
+        has moved."""
         mover = pair.leader if back else pair.follower
         if mover.rigid:
             return False

@@ -304,7 +304,7 @@ class Pair:
         self.touched = bool((hits >= 0.0).any() or (found >= 0.0).any())
 
     def may_touch(self, stretch: float) -> bool:
-        """May nodes of one come to the other within so many steps as this one?"""
+        """Whether nodes of one may come to the other within so many steps as long as this one."""
         ways = self.leader.way + self.follower.way
         return self.is_near or self.clearance <= stretch * ways
 
@@ -324,7 +324,7 @@ class Pair:
 
     @property
     def touches(self) -> bool:
-        """Do the lines lie on each other, and not only at ends that are one?"""
+        """Whether the lines lie on each other, and not only at common ends."""
         return self.is_near and self.pinned > self.common
 
     def _find_touch(self, stretch: float, cuts: bool) -> float:

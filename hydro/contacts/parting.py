@@ -53,7 +53,7 @@ class Outlines(NamedTuple):
 
 @compiled_once
 def turns_inwards(outlines, node):
-    """Is the body at a node of its outline wider than a straight angle?"""
+    """Whether the body is wider than a straight angle at a node of its outline."""
     before = outlines.before[node]
     after = outlines.after[node]
     if before == NO_FACE or after == NO_FACE:
@@ -111,7 +111,7 @@ def find_normal_at(outlines, node):
 
 @compiled_once
 def looks_at_node(outlines, start, node):
-    """Does the face from `start` on look at one of the faces beside a node?"""
+    """Whether the face from `start` on faces one of the faces beside a node."""
     nodes = outlines.nodes
     dx, dy = nodes[0, start + 1] - nodes[0, start], nodes[1, start + 1] - nodes[1, start]
     for face in (outlines.before[node], outlines.after[node]):
@@ -191,7 +191,8 @@ def move_node(outlines, node, way_x, way_y):
 
 @compiled_once
 def push_node(outlines, node, body, reach):
-    """Push a node that lies deep in a body, and the face before it, apart; was it so?"""
+    """Push a node that lies deep in a body, and the face before it, apart; returns whether it
+    did."""
     nodes = outlines.nodes
     weights = outlines.weights
     start, part, depth = find_face_behind(outlines, node, body, reach)
@@ -326,6 +327,6 @@ class Bodies:
 
 
 def _may_move(key_node: KeyNode) -> bool:
-    """Do free surfaces alone rule the node?"""
+    """Whether free surfaces alone rule the node."""
     held = key_node.given or key_node.carried or key_node.constraining_faces
     return not held and bool(key_node.flowing)

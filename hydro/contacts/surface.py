@@ -12,7 +12,7 @@ from shockgrid.hydro.contacts.friction import cover_surface
 from shockgrid.hydro.contacts.laying import fit_plane
 from shockgrid.hydro.contacts.lines import make_line_nodes
 from shockgrid.hydro.contacts.touch import fill_inner, measure_way
-from shockgrid.hydro.facets.lines import fill_slopes, fill_squares
+from shockgrid.hydro.facets.lines import fill_line_slopes, fill_squares
 from shockgrid.hydro.facets.rows import make_line_arrays
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Role
@@ -69,7 +69,7 @@ class Surface:
 
     @property
     def has_met(self) -> bool:
-        """Has it lain on another surface before?"""
+        """Whether it has lain on another surface before."""
         return self.thick is not None
 
     def meet(self, sides: Sides) -> None:
@@ -92,7 +92,7 @@ class Surface:
 
     @property
     def at_sliding_contact(self) -> bool:
-        """Does it go on from the end of a sliding contact, or lie opposite to it?"""
+        """Whether it goes on from the end of a sliding contact, or lies opposite to one."""
         return self.moving_line.role in (Role.AT_CONTACT, Role.OPPOSITE)
 
     def read(self) -> None:
@@ -170,7 +170,7 @@ class Surface:
         arrays = self.arrays
         arrays.states[: rows.stop - rows.start] = self._view(rows)
         arrays.gap_p[:] = self._view(P_STAR)
-        fill_slopes.entry(line, arrays)
+        fill_line_slopes.entry(line, arrays)
 
     def put_cover(self, state: int) -> None:
         """Put contact states over those of the free surface."""
@@ -248,7 +248,7 @@ class Plane:
         return plane
 
     def holds(self, key_node: KeyNode) -> bool:
-        """Does a line that ends there keep to the plane?"""
+        """Whether a line that ends there keeps to the plane."""
         return any(segment in self.segments for segment, _ in key_node.ends)
 
     def gather_cells(self) -> np.ndarray:
@@ -266,7 +266,7 @@ class Plane:
 
 
 def is_surface(segment: object) -> bool:
-    """May the segment meet surfaces of other bodies?"""
+    """Whether the segment may meet surfaces of other bodies."""
     if isinstance(segment, FreeSurface):
         return True
     return isinstance(segment, Wall) and not isinstance(segment, Axis)

@@ -135,7 +135,8 @@ class Voids:
         self._pushed = False  # has any face a pressure from a void?
 
     def are_due(self, step: int, touching: bool) -> bool:
-        """Are they to be looked for?  Large ones with nothing in them only now and then."""
+        """Whether to look for voids in this step: large empty ones are searched only now and
+        then."""
         if self._asked or self.pressure > 0.0 or step % STEPS_PER_VOID_SEARCH == 0:
             return touching or self._asked or bool(self.found)
         return any(
@@ -271,7 +272,8 @@ class Voids:
         return np.concatenate([first, line[:, a + 1 : math.ceil(stop)], last], axis=1)
 
     def _shrinks_alone(self, stretches: list[Stretch], is_free: bool) -> bool:
-        """Do the surfaces of a loop follow each other, but for planes that hold the outer ends?"""
+        """Whether the surfaces of a loop follow each other, but for planes that hold the outer
+        ends."""
         surfaces = [curve for curve, _, _ in stretches if curve < len(self.surfaces)]
         if not is_free or any(self._resists_nothing(self.surfaces[curve]) for curve in surfaces):
             return False
@@ -284,7 +286,7 @@ class Voids:
 
     @staticmethod
     def _resists_nothing(surface: Surface) -> bool:
-        """Is a surface one that voids do not press on?"""
+        """Whether a surface is one that voids do not press on."""
         return surface.rigid or surface.segment.tension > 0.0
 
     def _measure(self, stretches: list[Stretch], is_free: bool) -> Void:
@@ -339,7 +341,7 @@ class Voids:
 
     @staticmethod
     def _is_closing(void: Void) -> bool:
-        """Are these the last cells of a round void, on which no two lines could close?"""
+        """Whether these are the last cells of a round void, on which no two lines could close."""
         small = void.area < (SMALL_VOID_DEPTHS * void.depth) ** 2
         is_round = void.area > ROUND_VOID_PART * void.around**2
         return void.shrinks_alone and small and is_round
@@ -445,7 +447,7 @@ class Voids:
 
 
 def _share_faces(one: Void, other: Void) -> bool:
-    """Have two voids, of different times, a face in common?"""
+    """Whether two voids, of different times, have a face in common."""
     return any(
         curve == there and first < end and start < last
         for curve, first, last in one.faces

@@ -202,7 +202,8 @@ def check_eos(block: str, eos: object) -> None:
 
 
 def is_same_material(eos: Any, other_eos: Any) -> bool:
-    """Do two equations of state give the same pressure everywhere: one kind, equal parameters?"""
+    """Whether two equations of state give the same pressure everywhere: one kind, equal
+    parameters."""
     if type(eos) is not type(other_eos):
         return False
     pairs = zip(eos.parameters, other_eos.parameters, strict=True)

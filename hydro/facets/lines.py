@@ -130,7 +130,7 @@ def compute_van_leer_weights(square_before, square_after):
 
 
 @kernel
-def fill_slopes(nodes, arrays):
+def fill_line_slopes(nodes, arrays):
     """Middles of the faces, and limited slopes of the states along the line: of `LineArrays`.
 
     nodes (2, n + 1).  The velocity is limited as a vector, so that a turned flow has the same

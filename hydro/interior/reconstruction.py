@@ -148,7 +148,7 @@ def make_row_phases(
     curved = geometry.curved
     switch = sound, eos_class.energy_part, HLL_JUMP_THRESHOLDS[flux], eos_class.opens_voids
     limit = choose_limit(limiter, eos_class.has_kinks or is_solid)
-    fill_slopes = make_slopes(limit, limiter in RELAXED, geometry, switch, is_solid)
+    fill_gradients = make_slopes(limit, limiter in RELAXED, geometry, switch, is_solid)
     fill_geometry = make_geometry(geometry.volume)
     fill_switch = make_switch(*switch)
 
@@ -188,7 +188,7 @@ def make_row_phases(
         if curved:
             fill_switch(Z, n, parameters)
             fill_smooth(Z, n)
-        fill_slopes(Z, scratch.count_whole(m), half_dt, parameters)
+        fill_gradients(Z, scratch.count_whole(m), half_dt, parameters)
 
     return RowPhases(
         measure_after, next_row, reconstruct, make_extrapolation(limit, geometry, sound)

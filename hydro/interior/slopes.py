@@ -83,7 +83,7 @@ def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
     sound, energy, least_jump, opens_voids = switch
 
     @compiled_once(allocates=False)
-    def fill_slopes(Z, n, half_dt, parameters):
+    def fill_gradients(Z, n, half_dt, parameters):
         """Gradients limited along both lines, and the primitive state at mid-time with them.
 
         The velocity is limited along and across each grid line.  The steps (differences to the
@@ -239,7 +239,7 @@ def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
             Z[scratch.X_CENTRE + k] = x
             Z[scratch.Y_CENTRE + k] = y
 
-    return fill_slopes
+    return fill_gradients
 
 
 def make_extrapolation(limit, geometry, sound_speed_squared_part):

@@ -24,17 +24,17 @@ def find_swept_mean(before, here, after, along, swept):
     before, here, after: of three cells along a grid line, in the sense of the flow; along: the
     contact's normal, from 0, along the line, to 1, across it; swept: the part of the cell.
     """
-    least = before if before < after else after
-    most = after if before < after else before
-    contrast = most - least
-    if not (least < here < most) or contrast < LEAST_CONTRAST:
+    lowest = before if before < after else after
+    highest = after if before < after else before
+    contrast = highest - lowest
+    if not (lowest < here < highest) or contrast < LEAST_CONTRAST:
         return here
     sign = 1.0 if after > before else -1.0
     steepness = STEP_STEEPNESS * along + LEAST_STEEPNESS
     # where in the cell the step lies: such that the cell has its mean
-    part = (here - least) / contrast
-    part = min(max(part, 1e-6), 1.0 - 1e-6)
-    growth = np.exp(sign * steepness * (2.0 * part - 1.0))
+    filled = (here - lowest) / contrast
+    filled = min(max(filled, 1e-6), 1.0 - 1e-6)
+    growth = np.exp(sign * steepness * (2.0 * filled - 1.0))
     whole = np.exp(steepness)
     middle = np.log((whole - growth) / (growth - 1.0 / whole)) / (2.0 * steepness)
     # mean over the swept part, from 1 - swept to 1
@@ -42,7 +42,7 @@ def find_swept_mean(before, here, after, along, swept):
     high = np.cosh(steepness * (1.0 - middle))
     low = np.cosh(steepness * (1.0 - swept - middle))
     mean = 0.5 * (1.0 + sign * np.log(high / low) / (steepness * swept))
-    return least + contrast * mean
+    return lowest + contrast * mean
 
 
 @compiled_once(allocates=False)

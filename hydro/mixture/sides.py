@@ -62,7 +62,7 @@ from shockgrid.hydro.rim import (
     U,
     V,
     find_carried_row,
-    find_cell,
+    find_cell_of_face,
 )
 from shockgrid.hydro.rows import STATE_ROWS
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
@@ -75,9 +75,9 @@ fill_faces = make_fill_faces(PLANE)
 
 
 @inlined
-def find_field_row(field, part):
+def find_field_row(field, field_part):
     """The row of a rim with a part of a carried field, both by their numbers."""
-    return find_carried_row(field) + part
+    return find_carried_row(field) + field_part
 
 
 @inlined
@@ -87,11 +87,11 @@ def mix_laws(laws, volume):
     Only the pressure on a wall depends on it, by a term of second order in the velocity's jump.
     """
     first, second = laws
-    rest = 1.0 - volume
+    volume_second = 1.0 - volume
     return (
-        volume * first[0] + rest * second[0],
-        volume * first[1] + rest * second[1],
-        volume * first[2] + rest * second[2],
+        volume * first[0] + volume_second * second[0],
+        volume * first[1] + volume_second * second[1],
+        volume * first[2] + volume_second * second[2],
     )
 
 
@@ -119,7 +119,7 @@ def make_gather(eos_class):
         nj = nodes.shape[2] - 1
         fill_faces(nodes, nodes, 0.0, rim)
         for k in range(rim.shape[1]):
-            side, i, j = find_cell(k, ni, nj)
+            side, i, j = find_cell_of_face(k, ni, nj)
             across = lengths[0] if side < 2 else lengths[1]
             for q in range(STATE_ROWS):
                 rim[q, k] = state[q, i + 1, j + 1]
@@ -127,12 +127,12 @@ def make_gather(eos_class):
                 value = carried[q, i + 1, j + 1]
                 rim[find_field_row(q, CARRIED_CELL), k] = value
                 rim[find_field_row(q, CARRIED_GHOST), k] = value
-            own = add_fractions(
+            mixed_parameters = add_fractions(
                 parameters,
                 carried[MASS_FRACTION, i + 1, j + 1],
                 carried[VOLUME_FRACTION, i + 1, j + 1],
             )
-            rim[C, k] = sound_speed_squared(rim[RHO, k], rim[P, k], own) ** 0.5
+            rim[C, k] = sound_speed_squared(rim[RHO, k], rim[P, k], mixed_parameters) ** 0.5
             rim[LENGTH, k] = across[i + 1, j + 1]
             for q in range(C + 1):
                 rim[RHO_FACE + q, k] = rim[q, k]
@@ -237,16 +237,16 @@ def make_trace_sides(eos_class):
         cells: as of `hydro.mixture.update`; laws: wave laws of both materials; walls, opened:
         of `hydro.perimeter.plan`.
         """
-        held, grids, found = cells
+        held, grids, predicted = cells
         ni = grids[0].shape[1] - 1
         nj = grids[0].shape[2] - 1
         fill_faces(grids[0], grids[1], inverse_dt, rim)
         for k in range(rim.shape[1]):
-            _, i, j = find_cell(k, ni, nj)
+            _, i, j = find_cell_of_face(k, ni, nj)
             x = rim[X_AREA, k]
             y = rim[Y_AREA, k]
-            (rho, u, v, p, e, c2), (part, volume) = trace(
-                held, grids[0], found, i, j, x, y, parameters
+            (rho, u, v, p, e, c2), (mass_fraction, volume) = trace(
+                held, grids[0], predicted, i, j, x, y, parameters
             )
             rim[RHO_TRACE, k] = rho
             rim[U_TRACE, k] = u
@@ -260,7 +260,7 @@ def make_trace_sides(eos_class):
             rim[HLL, k] = 0.0
             rim[ACOUSTIC, k] = 1.0
             # what a unit of mass brings along; beyond the cell's, which counts as nothing here
-            rim[find_field_row(BRINGS_FIRST, CARRIED_TRACE), k] = part
+            rim[find_field_row(BRINGS_FIRST, CARRIED_TRACE), k] = mass_fraction
             rim[find_field_row(BRINGS_FRACTION, CARRIED_TRACE), k] = volume / rho
             rim[find_field_row(BRINGS_VOLUME, CARRIED_TRACE), k] = 1.0 / rho
             for q in range(RIM_FIELDS):

@@ -108,7 +108,7 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
         return compute_gradient(limit(before, after), limit(below, above), *lines, inverse)
 
     @inlined
-    def find_part(cell, gradients, corners, least, most):
+    def find_part(cell, gradients, corners, lowest, highest):
         """The part of the slopes of a cell's materials that leaves none of them negative.
 
         Nor, at any corner, a volume fraction beyond least..most.
@@ -117,17 +117,17 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
         a, b, c, d = corners
         x = 0.25 * ((a[0] + c[0]) + (b[0] + d[0]))
         y = 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))
-        part = 1.0
+        fraction = 1.0
         for corner in corners:
             way_x = corner[0] - x
             way_y = corner[1] - y
             change = volume_x * way_x + volume_y * way_y
-            part = min(part, bound(change, cell[VOLUME], least, most))
+            fraction = min(fraction, bound(change, cell[VOLUME], lowest, highest))
             change = first_x * way_x + first_y * way_y
-            part = min(part, bound(change, cell[PART_FIRST], 0.0, 1e300))
+            fraction = min(fraction, bound(change, cell[PART_FIRST], 0.0, 1e300))
             change = second_x * way_x + second_y * way_y
-            part = min(part, bound(change, cell[PART_SECOND], 0.0, 1e300))
-        return part
+            fraction = min(fraction, bound(change, cell[PART_SECOND], 0.0, 1e300))
+        return fraction
 
     @inlined
     def find_extremes(around):
@@ -205,10 +205,10 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
         slopes[q, SLOPE_Y, i, j] = gradient[1]
 
     @compiled_once(allocates=False)
-    def fill_cell(held, nodes, lengths, cell, half_dt, parameters, found):
+    def fill_cell(held, nodes, lengths, cell, half_dt, parameters, predicted):
         """Slopes, mid-time values and marks of a cell."""
         state, carried = held
-        slopes, marks = found
+        slopes, marks = predicted
         length_i, length_j = lengths
         i, j = cell
         corners = find_corners(nodes, i, j)
@@ -234,8 +234,8 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
         # sound speed, and whether the cell lies in a shock
         first, second, u, v, p, volume = here
         rho = state[RHO, a, b]
-        own = add_fractions(parameters, carried[MASS_FRACTION, a, b], volume)
-        c2 = sound_speed_squared(rho, p, own)
+        mixed_parameters = add_fractions(parameters, carried[MASS_FRACTION, a, b], volume)
+        c2 = sound_speed_squared(rho, p, mixed_parameters)
         marks[SQUARED_SOUND, i, j] = c2
         marks[HLL_SWITCH, i, j] = compute_hll_switch(
             before[PRESSURE] - p,
@@ -255,7 +255,7 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
             around, weights, lines, inverse, corners
         )
         has_both = LEAST_SHARP_FRACTION < volume < 1.0 - LEAST_SHARP_FRACTION
-        stiffness = 1.0 / compliance(rho, p, own)
+        stiffness = 1.0 / compliance(rho, p, mixed_parameters)
         marks[SHARP, i, j] = find_calm(around, stiffness) if has_both else 0.0
         # half a step in time (F3.6, F19.4)
         divergence = u_x + v_y
@@ -274,13 +274,13 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
         keep(slopes, VOLUME, i, j, volume - half_dt * volume_change, volume_slope)
 
     @kernel(allocates=False)
-    def fill_slopes(held, nodes, lengths, half_dt, parameters, rows, found):
+    def fill_slopes(held, nodes, lengths, half_dt, parameters, rows, predicted):
         """Slopes, mid-time values and marks of the rows of cells that a step reads.
 
         held: state (4, ni + 2, nj + 2) and fractions (2, ni + 2, nj + 2), with ghosts; lengths:
         along i and j, (ni + 2, nj + 2) each; rows: the first row and the one after the last, whose
-        neighbours are filled too, and the cells along all sides; found: slopes (6, 3, ni, nj) and
-        marks (4, ni, nj), which are filled.
+        neighbours are filled too, and the cells along all sides; predicted: slopes (6, 3, ni, nj)
+        and marks (4, ni, nj), which are filled.
         """
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
@@ -289,7 +289,7 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
             near = first - 1 <= i < last + 1 or i == 0 or i == ni - 1
             for j in range(nj):
                 if near or j == 0 or j == nj - 1:
-                    fill_cell(held, nodes, lengths, (i, j), half_dt, parameters, found)
+                    fill_cell(held, nodes, lengths, (i, j), half_dt, parameters, predicted)
 
     return fill_slopes
 

@@ -40,47 +40,47 @@ def make_trace(eos_class):
     energy = eos_class.energy_part
 
     @compiled_once(allocates=False)
-    def trace(held, nodes, found, i, j, x, y, parameters):
+    def trace(held, nodes, predicted, i, j, x, y, parameters):
         """State (rho, u, v, p, e, c²) and (mass, volume) fractions at mid-time at (x, y).
 
-        held: state and fractions with ghosts; found: slopes and marks.  Where that would be no
+        held: state and fractions with ghosts; predicted: slopes and marks.  Where that would be no
         state of the two materials, the cell's own.
         """
         state, carried = held
-        slopes, marks = found
+        slopes, marks = predicted
         a, b, c, d = find_corners(nodes, i, j)
-        way_x = x - 0.25 * ((a[0] + c[0]) + (b[0] + d[0]))
-        way_y = y - 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))
-        first = find_value(slopes, PART_FIRST, i, j, way_x, way_y)
-        second = find_value(slopes, PART_SECOND, i, j, way_x, way_y)
-        volume = find_value(slopes, VOLUME, i, j, way_x, way_y)
-        u = find_value(slopes, SPEED_X, i, j, way_x, way_y)
-        v = find_value(slopes, SPEED_Y, i, j, way_x, way_y)
-        p = find_value(slopes, PRESSURE, i, j, way_x, way_y)
+        offset_x = x - 0.25 * ((a[0] + c[0]) + (b[0] + d[0]))
+        offset_y = y - 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))
+        first = find_value(slopes, PART_FIRST, i, j, offset_x, offset_y)
+        second = find_value(slopes, PART_SECOND, i, j, offset_x, offset_y)
+        volume = find_value(slopes, VOLUME, i, j, offset_x, offset_y)
+        u = find_value(slopes, SPEED_X, i, j, offset_x, offset_y)
+        v = find_value(slopes, SPEED_Y, i, j, offset_x, offset_y)
+        p = find_value(slopes, PRESSURE, i, j, offset_x, offset_y)
         own_rho = state[RHO, i + 1, j + 1]
-        own_part = carried[MASS_FRACTION, i + 1, j + 1]
+        mass_fraction_of_cell = carried[MASS_FRACTION, i + 1, j + 1]
         # a material of which there would be less than none there: those of the cell
         rho = first + second
         least = -ROUND_OFF_FRACTION
         whole = (first >= least * rho) & (second >= least * rho)
         if not (whole & (volume >= least) & (volume <= 1.0 - least)):
             rho = own_rho
-            first = own_rho * own_part
+            first = own_rho * mass_fraction_of_cell
             volume = carried[VOLUME_FRACTION, i + 1, j + 1]
-        part = first / rho
-        own = add_fractions(parameters, part, volume)
-        c2 = sound_speed_squared(rho, p, own)
+        mass_fraction = first / rho
+        mixed_parameters = add_fractions(parameters, mass_fraction, volume)
+        c2 = sound_speed_squared(rho, p, mixed_parameters)
         # no state: that of the cell
         if not ((rho > 0.0) & (c2 > 0.0)):
             rho = own_rho
             u = state[U, i + 1, j + 1]
             v = state[V, i + 1, j + 1]
             p = state[P, i + 1, j + 1]
-            part = own_part
+            mass_fraction = mass_fraction_of_cell
             volume = carried[VOLUME_FRACTION, i + 1, j + 1]
-            own = add_fractions(parameters, part, volume)
+            mixed_parameters = add_fractions(parameters, mass_fraction, volume)
             c2 = marks[SQUARED_SOUND, i, j]
-        e = energy(rho, p, own)
-        return (rho, u, v, p, e, c2), (part, volume)
+        e = energy(rho, p, mixed_parameters)
+        return (rho, u, v, p, e, c2), (mass_fraction, volume)
 
     return trace

@@ -105,19 +105,19 @@ def make_exchange(eos_class):
         Both keep their densities, pressure and velocity: those of `side`, where it comes from.
         """
         mass, x, y, energy, first, brought, passing = flux
-        (rho, u, v, p, _, _), (part, volume) = side
-        own = add_fractions(parameters, part, volume)
-        rho_first, rho_second, held_first, held_second = find_parts(rho, p, own)
-        more = passing * fraction - brought
-        more_mass = more * (rho_first - rho_second)
+        (rho, u, v, p, _, _), (mass_fraction, volume) = side
+        mixed_parameters = add_fractions(parameters, mass_fraction, volume)
+        rho_first, rho_second, held_first, held_second = find_parts(rho, p, mixed_parameters)
+        excess = passing * fraction - brought
+        more_mass = excess * (rho_first - rho_second)
         kinetic = 0.5 * (u * u + v * v)
         return (
             mass + more_mass,
             x + more_mass * u,
             y + more_mass * v,
-            energy + more * (held_first - held_second) + more_mass * kinetic,
-            first + more * rho_first,
-            brought + more,
+            energy + excess * (held_first - held_second) + more_mass * kinetic,
+            first + excess * rho_first,
+            brought + excess,
             passing,
         )
 
@@ -170,16 +170,16 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
         return dt * (abs(u * yj - v * xj) + abs(u * yi - v * xi)) / area
 
     @compiled_once(allocates=False)
-    def sharpen(flux, side, giver, way, cells, sharpness, dt, parameters):
+    def sharpen(flux, side, giver, direction, cells, sharpness, dt, parameters):
         """A flux out of the cell `giver`, which has both materials, with a sharp contact.
 
-        way: the step (i, j) to the cell that receives it; sharpness: how far, 0 to 1.
+        direction: the step (i, j) to the cell that receives it; sharpness: how far, 0 to 1.
         """
         (state, carried), grids, (slopes, _) = cells
         i, j = giver
         a = i + 1
         b = j + 1
-        step_i, step_j = way
+        step_i, step_j = direction
         fractions = carried[VOLUME_FRACTION]
         here = fractions[a, b]
         before = fractions[a - step_i, b - step_j]
@@ -210,32 +210,37 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
         return exchange(flux, side, fraction, parameters)
 
     @compiled_once(allocates=False)
-    def pass_face(cells, one, other, place, dt, parameters):
-        """Fluxes from the cell `one` to `other` through the face between the nodes of `place`."""
-        held, grids, found = cells
+    def pass_face(cells, cell_before, cell_after, place, dt, parameters):
+        """Fluxes from the cell `cell_before` to `cell_after` through the face between the nodes of
+        `place`."""
+        held, grids, predicted = cells
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         i, j, i_end, j_end = place
         area_x, area_y, sweep, x, y = find_face(grids, i, j, i_end, j_end, inverse_dt)
-        left = trace(held, grids[0], found, one[0], one[1], x, y, parameters)
-        right = trace(held, grids[0], found, other[0], other[1], x, y, parameters)
-        marks = found[1]
-        hll = marks[HLL_SWITCH, one[0], one[1]] + marks[HLL_SWITCH, other[0], other[1]]
+        left = trace(held, grids[0], predicted, cell_before[0], cell_before[1], x, y, parameters)
+        right = trace(held, grids[0], predicted, cell_after[0], cell_after[1], x, y, parameters)
+        marks = predicted[1]
+        hll = (
+            marks[HLL_SWITCH, cell_before[0], cell_before[1]]
+            + marks[HLL_SWITCH, cell_after[0], cell_after[1]]
+        )
         weight = 1.0
         if low_mach:
             weight = max(
-                marks[ACOUSTIC_PART, one[0], one[1]], marks[ACOUSTIC_PART, other[0], other[1]]
+                marks[ACOUSTIC_PART, cell_before[0], cell_before[1]],
+                marks[ACOUSTIC_PART, cell_after[0], cell_after[1]],
             )
         flux = compute_flux(left, right, (area_x, area_y, sweep), hll, weight)
         if sharp and hll == 0.0 and dt > 0.0:
-            step_i = other[0] - one[0]
-            step_j = other[1] - one[1]
+            step_i = cell_after[0] - cell_before[0]
+            step_j = cell_after[1] - cell_before[1]
             from_one = flux[VOLUME_FLUX] > 0.0
-            giver = one if from_one else other
-            way = (step_i, step_j) if from_one else (-step_i, -step_j)
+            giver = cell_before if from_one else cell_after
+            direction = (step_i, step_j) if from_one else (-step_i, -step_j)
             sharpness = marks[SHARP, giver[0], giver[1]]
             if sharpness > 0.0:
                 side = left if from_one else right
-                flux = sharpen(flux, side, giver, way, cells, sharpness, dt, parameters)
+                flux = sharpen(flux, side, giver, direction, cells, sharpness, dt, parameters)
         return flux
 
     @inlined
@@ -291,16 +296,16 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
         rho = state[RHO, a, b]
         u = state[U, a, b]
         v = state[V, a, b]
-        part = carried[MASS_FRACTION, a, b]
+        mass_fraction = carried[MASS_FRACTION, a, b]
         fraction = carried[VOLUME_FRACTION, a, b]
-        own = add_fractions(parameters, part, fraction)
-        e = energy_of(rho, state[P, a, b], own)
+        mixed_parameters = add_fractions(parameters, mass_fraction, fraction)
+        e = energy_of(rho, state[P, a, b], mixed_parameters)
         held_mass = volume * rho
         mass = held_mass - dt * find_outflow(fluxes, MASS, j)
         momentum_x = held_mass * u - dt * find_outflow(fluxes, MOMENTUM_X, j)
         momentum_y = held_mass * v - dt * find_outflow(fluxes, MOMENTUM_Y, j)
         total = held_mass * (e + 0.5 * (u * u + v * v)) - dt * find_outflow(fluxes, ENERGY, j)
-        first = held_mass * part - dt * find_outflow(fluxes, FIRST_FLUX, j)
+        first = held_mass * mass_fraction - dt * find_outflow(fluxes, FIRST_FLUX, j)
         # the volume fraction (F19.3), which is none beyond 0..1
         passed = find_outflow(fluxes, FRACTION_FLUX, j)
         passed -= fraction * find_outflow(fluxes, VOLUME_FLUX, j)
@@ -310,15 +315,15 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
         rho = mass / volume_new
         u = momentum_x / mass
         v = momentum_y / mass
-        part = first / mass
-        own = add_fractions(parameters, part, fraction)
-        p = pressure(rho, total / mass - 0.5 * (u * u + v * v), own)
-        c2 = sound_speed_squared(rho, p, own)
+        mass_fraction = first / mass
+        mixed_parameters = add_fractions(parameters, mass_fraction, fraction)
+        p = pressure(rho, total / mass - 0.5 * (u * u + v * v), mixed_parameters)
+        c2 = sound_speed_squared(rho, p, mixed_parameters)
         state_new[RHO, a, b] = rho
         state_new[U, a, b] = u
         state_new[V, a, b] = v
         state_new[P, a, b] = p
-        carried_new[MASS_FRACTION, a, b] = part
+        carried_new[MASS_FRACTION, a, b] = mass_fraction
         carried_new[VOLUME_FRACTION, a, b] = fraction
         # its rate (F7.1), and the sums
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0

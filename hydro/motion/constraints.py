@@ -38,7 +38,7 @@ from shockgrid.hydro.boundary import Segment
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Line
 from shockgrid.hydro.sliding.contact import SlidingContact
-from shockgrid.hydro.sliding.pieces import fill_positions, find_last_crossing
+from shockgrid.hydro.sliding.pieces import find_last_crossing, project_in_order
 from shockgrid.regrid.curves import compute_arc_lengths, meeting_laws
 from shockgrid.regrid.errors import BadInput, Place, RegridFailure
 
@@ -248,12 +248,12 @@ class FollowerMotion:
         if position is None:
             moved_end = self.contact.follower.line(new=True)[:, [-end]]
             found = np.empty(1)
-            fill_positions(line, moved_end, found)
+            project_in_order(line, moved_end, found)
             face = min(int(found[0]), line.shape[1] - 2)
             position = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
         # where the point was, on the new line
         was = np.empty(1)
-        fill_positions(line, np.reshape(start, (2, 1)), was)
+        project_in_order(line, np.reshape(start, (2, 1)), was)
         face = min(int(was[0]), line.shape[1] - 2)
         before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
         # close to the end of the leader's line it is caught by its last node
@@ -377,7 +377,7 @@ def find_corner(
 
 
 def _is_free(node: KeyNode, followers: Sequence[FollowerMotion]) -> bool:
-    """Do links and free surfaces alone rule the node, and is it laid on no other's line?"""
+    """Whether links and free surfaces alone rule the node, and it is laid on no other's line."""
     if node.given or node.constraining_faces or node.carried or not node.flowing:
         return False
     for segment, face in node.ends:
@@ -394,7 +394,8 @@ def _is_free(node: KeyNode, followers: Sequence[FollowerMotion]) -> bool:
 
 
 def _is_fixed_at(follower: FollowerMotion, end: int, nodes: list[KeyNode]) -> bool:
-    """Is that end of the follower fixed at an end of the leader that is at one of the nodes?"""
+    """Whether that end of the follower is fixed at an end of the leader that is at one of the
+    nodes."""
     contact = follower.contact
     if contact.fixed[end] < 0:
         return False

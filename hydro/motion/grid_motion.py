@@ -254,7 +254,7 @@ class GridMotion:
 
 
 def crosses_seam(block: Block) -> bool:
-    """Is one of the two lines that cross along the new sides of a block a seam?"""
+    """Whether one of the two lines that cross along the new sides of a block is a seam."""
     for side, node in find_crossing(block.nodes_new) or ():
         for segment in block.segments:
             if segment.side == side and segment.start <= node <= segment.stop:

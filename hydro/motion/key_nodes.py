@@ -133,7 +133,8 @@ class KeyNode:
         return x, y
 
     def lies_on_one_piston(self, walls: bool) -> bool:
-        """Are all pistons at the node on one line; with `walls`, the lines that hold it as well?"""
+        """Whether all pistons at the node lie on one line; with `walls`, the lines that hold it as
+        well."""
         faces = [(segment.block, face) for segment, face in self.given]
         faces += self.constraining_faces if walls else []
         normals = [(float(b.rim.nx[face]), float(b.rim.ny[face])) for b, face in faces]

@@ -303,7 +303,8 @@ class Line:
 
     `spacing` (n + 1,): where its nodes are to be along it, from 0 to 1; `role`: see ROLES.
 
-    `waits`: is it moved after the sliding contacts?  `respaced`: is it spread along itself?
+    `waits`: whether it moves after the sliding contacts; `respaced`: whether it is spread along
+    itself.
     """
 
     waits = True
@@ -350,7 +351,7 @@ class Line:
 
     @property
     def may_lie_on_body(self) -> bool:
-        """Does it move with the flow, away from sliding contacts?"""
+        """Whether it moves with the flow, away from sliding contacts."""
         return self.role in (Role.FLOWING, Role.ON_BODY)
 
     def lie_on_body(self) -> None:
@@ -467,7 +468,7 @@ class StraightLine(Line):
     """A line that can lie straight between its ends, spread by its spacing."""
 
     def lies_straight(self) -> bool:
-        """Does it, and need not be spread by another line?"""
+        """Whether its track is straight, and no other line sets its spacing."""
         return self.track.straight and self.role is not Role.OPPOSITE
 
     def move(self, span):

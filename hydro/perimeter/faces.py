@@ -21,7 +21,7 @@ from shockgrid.hydro.rim import (
     Y_AREA,
     X,
     Y,
-    find_cell,
+    find_cell_of_face,
     find_ends,
     find_face,
 )
@@ -148,7 +148,7 @@ def make_fill_polygons(eos_class, geometry: Geometry):
         totals[:] = 0.0
         totals[LEAST_C2] = NO_C2
         for face in range(excess_volume.shape[0]):
-            side, i, j = find_cell(face, ni, nj)
+            side, i, j = find_cell_of_face(face, ni, nj)
             # volumes beyond the straight faces, in a corner of the block those of both its sides
             beyond = excess_volume[face]
             beyond_new = excess_volume_new[face]

@@ -14,9 +14,9 @@ class PerimeterPlan:
     `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
     (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
     indices of moving walls, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): faces
-    that need the next cells inward; `moving` (n, 2): the spans of faces that move with the flow;
-    `counted` (n, 2): the spans through which totals change, of segments without a partner or with
-    surface tension; `is_follower`: whether a sliding contact places nodes of these segments on
+    that need the next cells inward; `flowing_spans` (n, 2): the spans of faces that move with the
+    flow; `counted` (n, 2): the spans through which totals change, of segments without a partner or
+    with surface tension; `is_follower`: whether a sliding contact places nodes of these segments on
     another's line.
     """
 
@@ -33,7 +33,7 @@ class PerimeterPlan:
         )
         self.pistons = [(n, wall) for n, wall in enumerate(walls) if wall.moves]
         self.wall_speeds = np.zeros((len(walls), 2))
-        self.moving = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)
+        self.flowing_spans = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)
         self.inwards = np.zeros(faces, dtype=np.bool_)
         for segment in segments:
             self.inwards[segment.first : segment.last] = segment.moves

@@ -214,7 +214,7 @@ def make_side_kernels(
     def gather(state, nodes, parameters, inwards, Z, rim):
         """States, sound speeds and lengths across the side of the cells; states at the faces.
 
-        inwards (faces,): are the next cell and the state at the face asked for?  Elsewhere the
+        inwards (faces,): whether the next cell and the state at the face are wanted; elsewhere the
         cell's own stands for it.
         """
         ni = nodes.shape[1] - 1

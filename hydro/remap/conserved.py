@@ -141,7 +141,7 @@ MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
 def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:
-    """Are rho, u, v, p (4, ...) finite, with a density and a c² above 0?"""
+    """Whether rho, u, v, p (4, ...) are finite, with a density and a c² above 0."""
     with np.errstate(all="ignore"):
         c2 = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
         return np.isfinite(state).all(axis=0) & (state[RHO] > 0.0) & (c2 > 0.0)

@@ -66,8 +66,8 @@ def merge_states(
     rho = mass / volumes
     u = momentum_x / mass
     v = momentum_y / mass
-    own = eos.with_fields(np.array([mass_fraction, volume_fraction]))
-    p = own.pressure(rho, energy / mass - 0.5 * (u * u + v * v))
+    mixed_eos = eos.with_fields(np.array([mass_fraction, volume_fraction]))
+    p = mixed_eos.pressure(rho, energy / mass - 0.5 * (u * u + v * v))
     return {
         "rho": rho,
         "u": u,
@@ -102,7 +102,7 @@ class Handover:
         self.first_nodes: np.ndarray | None = None  # of the new block, when it is there
 
     def is_due(self, t: float) -> bool:
-        """Is it time?  Only once."""
+        """Whether it is time to merge; true once only."""
         return self.first_nodes is None and self.time is not None and t >= self.time
 
     def merge(self, blocks: Sequence[Block]) -> tuple[list[Block], list, Callable[[], object]]:

@@ -30,7 +30,8 @@ MOST_CORNERS = 16  # of a quadrilateral cut by four lines, with room for corners
 
 @compiled_once
 def cut_polygon(x, y, n, out_x, out_y, line):
-    """The part of a polygon to the left of a line, into `out`: corners, and was any cut off?
+    """The part of a polygon to the left of a line, into `out`; returns the number of corners and
+    whether any was cut off.
 
     line: a point on it and its direction.
     """

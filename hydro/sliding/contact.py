@@ -18,7 +18,7 @@ from shockgrid.hydro.boundary import NodeMotion, Sliding
 from shockgrid.hydro.carried.fields import check_same
 from shockgrid.hydro.carried.sliding import carry_through_closing_faces
 from shockgrid.hydro.eos.base import is_same_material
-from shockgrid.hydro.facets.lines import fill_radius_weighted_areas, fill_slopes
+from shockgrid.hydro.facets.lines import fill_line_slopes, fill_radius_weighted_areas
 from shockgrid.hydro.facets.rows import (
     FOLLOWER,
     LEADER,
@@ -46,8 +46,8 @@ from shockgrid.hydro.sliding.pieces import (
     SURFACE_ROWS,
     fill_pieces,
     fill_points,
-    fill_positions,
     fill_surface,
+    project_in_order,
 )
 from shockgrid.hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
 from shockgrid.regrid.curves import arc_spacing
@@ -90,7 +90,7 @@ class Chain:
     def read_states(self, rows: slice, nodes: np.ndarray) -> None:
         """States from these rows of the rims, and their slopes along the line of `nodes`."""
         self.read(rows, self.arrays.states[: rows.stop - rows.start])
-        fill_slopes.entry(nodes, self.arrays)
+        fill_line_slopes.entry(nodes, self.arrays)
 
     def list_wave_laws(self) -> np.ndarray:
         """Wave laws of the materials along the chain, (3, faces)."""
@@ -258,7 +258,7 @@ class SlidingContact:
                 follower_line[:, -end] = line[:, self.fixed[end]]
         # the follower's nodes lie on the leader's line, one after another
         positions = np.empty(follower_line.shape[1])
-        fill_positions(line, follower_line, positions)
+        project_in_order(line, follower_line, positions)
         points = np.empty_like(follower_line)
         fill_points(line, positions, points)
         gap = np.abs(points - follower_line).max() / np.ptp(follower_line, axis=1).max()
@@ -304,7 +304,7 @@ class SlidingContact:
         """Pieces, positions and polygon areas of the old grid."""
         self.lines = self.leader.line(), self.follower.line()
         line, follower_line = self.lines
-        fill_positions(line, follower_line, self.positions)
+        project_in_order(line, follower_line, self.positions)
         self.count = fill_pieces.entry(
             line, self.no_displacement, self.positions, self.leader.orientation, 0.0, self.pieces
         )
@@ -318,7 +318,7 @@ class SlidingContact:
         """With the sides' new nodes known: positions and polygon areas of the new grid."""
         line = self.leader.line(new=True)
         follower_line = self.follower.line(new=True)
-        fill_positions(line, follower_line, self.positions_new)
+        project_in_order(line, follower_line, self.positions_new)
         self.fill_excess_volume(
             line, follower_line, self.positions_new, self.leader.orientation, self.excess_volume_new
         )
@@ -358,7 +358,7 @@ class SlidingContact:
         middle = 0.5 * (old + new)
         displacement = new - old
         follower_middle = 0.5 * (follower_old + follower_new)
-        fill_positions(middle, follower_middle, self.positions)
+        project_in_order(middle, follower_middle, self.positions)
         orientation = leader.orientation
         self.count = fill_pieces.entry(
             middle, displacement, self.positions, orientation, 1.0 / dt, self.pieces

@@ -45,7 +45,7 @@ SURFACE_ROWS = 5
 
 
 @kernel
-def fill_positions(leader, points, positions):
+def project_in_order(leader, points, positions):
     """Positions (n,) on the leader (2, m + 1) nearest to the points (2, n), which follow its order.
 
     A position is looked for from the one before it onwards, so that positions never fall, up to the

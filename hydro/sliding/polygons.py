@@ -18,7 +18,7 @@ import functools
 from shockgrid.hydro.facets.rows import FOLLOWER, STATE_E, SWEPT_RATE
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.perimeter.faces import measure_volume
-from shockgrid.hydro.rim import find_cell, find_excess
+from shockgrid.hydro.rim import find_cell_of_face, find_excess
 from shockgrid.hydro.rows import FLUX_ROWS, RHO, P, U, V
 from shockgrid.regrid.jit import kernel
 
@@ -144,7 +144,7 @@ def make_find_crushed(geometry: Geometry = PLANE):
         at_j = -1
         for face in range(excess.shape[0]):
             if excess_new[face] < 0.0:
-                _, i, j = find_cell(face, ni, nj)
+                _, i, j = find_cell_of_face(face, ni, nj)
                 excess_here = find_excess(excess, i, j, ni, nj)
                 volume = measure_volume(nodes, i, j, compute_volume) + excess_here
                 excess_here = find_excess(excess_new, i, j, ni, nj)

@@ -64,7 +64,7 @@ def keep_rates(rates, i, j, gradient, hoop):
 
 @inlined
 def is_read(i, j, ni, nj, rows):
-    """Does a step that updates these rows of cells read what is predicted in a cell?"""
+    """Whether a step that updates these rows of cells reads what is predicted in a cell."""
     first, last = rows
     near = first - 1 <= i < last + 1 and last > first
     return near or i == 0 or i == ni - 1 or j == 0 or j == nj - 1
@@ -80,14 +80,16 @@ def make_predict_rates(geometry: Geometry):
     @inlined
     def limit_along(state, measures, length, here, before, after, line):
         """Limited variation of the velocity along a line through three cells (i, j)."""
-        first, second = compute_difference_weights(measures, length, here, before, after)
+        weight_before, weight_after = compute_difference_weights(
+            measures, length, here, before, after
+        )
         u = state[U, here[0], here[1]]
         v = state[V, here[0], here[1]]
         return limit_velocity(
-            (u - state[U, before[0], before[1]]) * first,
-            (v - state[V, before[0], before[1]]) * first,
-            (state[U, after[0], after[1]] - u) * second,
-            (state[V, after[0], after[1]] - v) * second,
+            (u - state[U, before[0], before[1]]) * weight_before,
+            (v - state[V, before[0], before[1]]) * weight_before,
+            (state[U, after[0], after[1]] - u) * weight_after,
+            (state[V, after[0], after[1]] - v) * weight_after,
             line[0],
             line[1],
             1.0 / (line[0] * line[0] + line[1] * line[1]),
@@ -221,10 +223,10 @@ def make_measure_rates(geometry: Geometry):
 def strain_stress(s, rates, i, j, shear, flow_stress, hardening, dt):
     """A cell's stress (s_xx, s_yy, s_xy) turned, strained and returned; then the plastic strain."""
     s_xx, s_yy, s_xy = turn_stress(s[0], s[1], s[2], 0.5 * dt * rates[SPIN, i, j])
-    more = 2.0 * dt * shear
-    s_xx += more * rates[RATE_XX, i, j]
-    s_yy += more * rates[RATE_YY, i, j]
-    s_xy += more * rates[RATE_XY, i, j]
+    growth = 2.0 * dt * shear
+    s_xx += growth * rates[RATE_XX, i, j]
+    s_yy += growth * rates[RATE_YY, i, j]
+    s_xy += growth * rates[RATE_XY, i, j]
     return return_to_yield(s_xx, s_yy, s_xy, shear, flow_stress, hardening)
 
 
@@ -262,8 +264,8 @@ def make_predict_stress(geometry: Geometry):
                 else:
                     # nothing that fluids and pieces bear
                     for q in range(S_XX, S_XY + 1):
-                        for part in range(slopes.shape[1]):
-                            slopes[q, part, i, j] = 0.0
+                        for slope_row in range(slopes.shape[1]):
+                            slopes[q, slope_row, i, j] = 0.0
                 pull_x = slopes[S_XX, SLOPE_X, i, j] + slopes[S_XY, SLOPE_Y, i, j]
                 pull_y = slopes[S_XY, SLOPE_X, i, j] + slopes[S_YY, SLOPE_Y, i, j]
                 if curved:

@@ -72,7 +72,7 @@ from shockgrid.hydro.rim import (
     U,
     V,
     find_carried_row,
-    find_cell,
+    find_cell_of_face,
     find_face,
 )
 from shockgrid.hydro.strength.rates import S_XX, S_XY, S_YY
@@ -86,20 +86,21 @@ SIDE_ROWS = 4
 
 
 @inlined
-def get_stress(rim, first, part, k):
-    """(s_xx, s_yy, s_xy) in the row `part` of carried fields, such as CARRIED_TRACE, of a face."""
-    xx = find_carried_row(first + S_XX) + part
-    yy = find_carried_row(first + S_YY) + part
-    xy = find_carried_row(first + S_XY) + part
+def get_stress(rim, first, carried_row, k):
+    """(s_xx, s_yy, s_xy) in the row `carried_row` of carried fields, such as CARRIED_TRACE, of a
+    face."""
+    xx = find_carried_row(first + S_XX) + carried_row
+    yy = find_carried_row(first + S_YY) + carried_row
+    xy = find_carried_row(first + S_XY) + carried_row
     return rim[xx, k], rim[yy, k], rim[xy, k]
 
 
 @inlined
-def put_stress(rim, first, part, k, stress):
+def put_stress(rim, first, carried_row, k, stress):
     """Store what `get_stress` reads."""
-    rim[find_carried_row(first + S_XX) + part, k] = stress[0]
-    rim[find_carried_row(first + S_YY) + part, k] = stress[1]
-    rim[find_carried_row(first + S_XY) + part, k] = stress[2]
+    rim[find_carried_row(first + S_XX) + carried_row, k] = stress[0]
+    rim[find_carried_row(first + S_YY) + carried_row, k] = stress[1]
+    rim[find_carried_row(first + S_XY) + carried_row, k] = stress[2]
 
 
 @compiled_once(allocates=False)
@@ -122,11 +123,11 @@ def extrapolate_stress(values, state, rim, k, shape):
     rough = (jump - CALM_PRESSURE_JUMP) / (SHOCK_PRESSURE_JUMP - CALM_PRESSURE_JUMP)
     rough = min(max(rough, 0.0), 1.0)
     smooth = (1.0 - rough) * (1.0 - rough) * (1.0 + 2.0 * rough)
-    part = smooth * (0.5 * rim[LENGTH, k] / rim[DISTANCE_NEXT, k])
+    slope_part = smooth * (0.5 * rim[LENGTH, k] / rim[DISTANCE_NEXT, k])
     return (
-        own[0] + part * limit_gently(own[0] - nearer[0], nearer[0] - further[0]),
-        own[1] + part * limit_gently(own[1] - nearer[1], nearer[1] - further[1]),
-        own[2] + part * limit_gently(own[2] - nearer[2], nearer[2] - further[2]),
+        own[0] + slope_part * limit_gently(own[0] - nearer[0], nearer[0] - further[0]),
+        own[1] + slope_part * limit_gently(own[1] - nearer[1], nearer[1] - further[1]),
+        own[2] + slope_part * limit_gently(own[2] - nearer[2], nearer[2] - further[2]),
     )
 
 
@@ -162,7 +163,7 @@ def start_stress(values, state, shear, walls, inwards, first, sides, rim):
         sides[SHEAR_STRESS, k] = 0.0
         if not inwards[k]:
             continue
-        side, i, j = find_cell(k, ni, nj)
+        side, i, j = find_cell_of_face(k, ni, nj)
         nx, ny = find_normal(rim, k)
         s_nn, s_tt, s_nt = resolve_cell(values, i, j, nx, ny)
         deep = (ni if side < 2 else nj) > 2
@@ -194,7 +195,7 @@ def fill_stress_ghosts(shear, spans, first, sides, rim):
     ni, nj = shear.shape
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
-            _, i, j = find_cell(k, ni, nj)
+            _, i, j = find_cell_of_face(k, ni, nj)
             nx, ny = find_normal(rim, k)
             s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_CELL, k)
             s_nn, s_tt, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
@@ -217,9 +218,9 @@ def fill_stress_ghosts(shear, spans, first, sides, rim):
             )
             put_stress(rim, first, CARRIED_GHOST, k, ghost)
             speed = rim[V, k] * nx - rim[U, k] * ny
-            more = 2.0 * (sides[SPEED_ALONG, k] - speed)
-            rim[U_GHOST, k] -= more * ny
-            rim[V_GHOST, k] += more * nx
+            excess = 2.0 * (sides[SPEED_ALONG, k] - speed)
+            rim[U_GHOST, k] -= excess * ny
+            rim[V_GHOST, k] += excess * nx
 
 
 @compiled_once(allocates=False)
@@ -243,7 +244,7 @@ def trace_stress_moving(slopes, centres, shear, spans, first, rim):
     ni, nj = shear.shape
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
-            _, i, j = find_cell(k, ni, nj)
+            _, i, j = find_cell_of_face(k, ni, nj)
             x = rim[X_TRACE, k]
             y = rim[Y_TRACE, k]
             stress = (
@@ -301,7 +302,7 @@ def trace_stress(shear, plan, wave_law, first, curved, sides, rim):
     ni, nj = shear.shape
     walls, opened = plan
     for k in range(rim.shape[1]):
-        _, i, j = find_cell(k, ni, nj)
+        _, i, j = find_cell_of_face(k, ni, nj)
         press_with_stress(rim, first, k, shear[i, j])
         sides[SHEAR_STRESS, k] = 0.0
         sides[SPEED_ALONG, k] = find_free_speed_along(rim, first, k, shear[i, j], RHO_TRACE)
@@ -328,15 +329,15 @@ def let_stress_pass(rim, sides, first, k, goes_on, curved):
 
 
 @kernel(allocates=False)
-def stick_together(one, other, pairs, phase, mass_passes, curved):
+def stick_together(leader, follower, pairs, phase, mass_passes, curved):
     """What acts along faces that stick together, into both rims: bonds and seams.
 
-    one, other: (rim, sides, shear, number of the first field) of both; pairs, phase: as of
+    leader, follower: (rim, sides, shear, number of the first field) of both; pairs, phase: as of
     `hydro.perimeter.contacts`, whose own part of the phase must be done.  mass_passes: faces of a
     seam do not go with the material, whose speed is that of the contact.
     """
-    rim, sides, shear, field = one
-    other_rim, other_sides, other_shear, other_field = other
+    rim, sides, shear, field = leader
+    other_rim, other_sides, other_shear, other_field = follower
     first, other_first, step, count = pairs
     ni, nj = shear.shape
     other_ni, other_nj = other_shear.shape
@@ -344,14 +345,16 @@ def stick_together(one, other, pairs, phase, mass_passes, curved):
     for n in range(count):
         k = first + n
         m = other_first + step * n
-        _, i, j = find_cell(k, ni, nj)
-        _, a, b = find_cell(m, other_ni, other_nj)
-        z, speed, own = find_shear_wave(rim, field, k, shear[i, j], state)
-        z_beyond, speed_beyond, beyond = find_shear_wave(
+        _, i, j = find_cell_of_face(k, ni, nj)
+        _, a, b = find_cell_of_face(m, other_ni, other_nj)
+        z, speed, stress_inside = find_shear_wave(rim, field, k, shear[i, j], state)
+        z_beyond, speed_beyond, stress_beyond = find_shear_wave(
             other_rim, other_field, m, other_shear[a, b], state
         )
         # the other's normal and direction along the face are turned: speeds change their sign
-        stress, along = compute_shear_contact((z, speed, own), (z_beyond, -speed_beyond, beyond))
+        stress, along = compute_shear_contact(
+            (z, speed, stress_inside), (z_beyond, -speed_beyond, stress_beyond)
+        )
         sides[SHEAR_STRESS, k] = other_sides[SHEAR_STRESS, m] = stress
         sides[SPEED_ALONG, k] = along
         other_sides[SPEED_ALONG, m] = -along
@@ -377,20 +380,20 @@ def go_along(rim, k, along):
 
 
 @inlined
-def find_speed_across(rim, k, other, m):
+def find_speed_across(rim, k, other_rim, m):
     """Speed along the normal of face k of the contact between two traces: HLLC, as inside."""
     area_x, area_y = rim[AREA_X, k], rim[AREA_Y, k]
     square = area_x * area_x + area_y * area_y
     w, w_beyond = riemann.compute_normal_speeds(
-        rim[U_TRACE, k], rim[V_TRACE, k], other[U_TRACE, m], other[V_TRACE, m],
+        rim[U_TRACE, k], rim[V_TRACE, k], other_rim[U_TRACE, m], other_rim[V_TRACE, m],
         area_x, area_y, rim[SWEPT, k],
     )  # fmt: skip
     wave, wave_beyond = riemann.compute_waves(
-        w, rim[C2_TRACE, k], w_beyond, other[C2_TRACE, m], square
+        w, rim[C2_TRACE, k], w_beyond, other_rim[C2_TRACE, m], square
     )
     push, drag, _, _ = riemann.compute_contact_speed(
         (rim[RHO_TRACE, k], rim[P_TRACE, k], w, wave),
-        (other[RHO_TRACE, m], other[P_TRACE, m], w_beyond, wave_beyond),
+        (other_rim[RHO_TRACE, m], other_rim[P_TRACE, m], w_beyond, wave_beyond),
         square,
     )
     return (push / drag + rim[SWEPT, k]) / square**0.5

@@ -65,17 +65,19 @@ def add_stress_fields(
             f"block {block!r}: strength wants an equation of state with a density at rest, rho0; "
             f"{eos.kind!r} has none"
         )
-    given = {field.name: field for field in fields}
-    own = [given.pop(field.name, field) for field in STRESS_FIELDS]
-    return (*own, *given.values())
+    fields_by_name = {field.name: field for field in fields}
+    stress_fields = [fields_by_name.pop(field.name, field) for field in STRESS_FIELDS]
+    return (*stress_fields, *fields_by_name.values())
 
 
 def stiffen_wave_law(wave_law: tuple[float, ...], eos: Any, law: StrengthLaw) -> tuple[float, ...]:
     """`EquationOfState.wave_law` with the impedance at rest of longitudinal waves."""
     a, b, z = wave_law
-    rest = np.array([float(eos.rho0)])
-    temperature = eos.temperature(rest, 0.0 * rest) if law.needs_temperature else None
-    shear = float(law.shear_modulus(rest, 0.0 * rest, temperature)[0])
+    rest_density = np.array([float(eos.rho0)])
+    temperature = (
+        eos.temperature(rest_density, 0.0 * rest_density) if law.needs_temperature else None
+    )
+    shear = float(law.shear_modulus(rest_density, 0.0 * rest_density, temperature)[0])
     return a, b, float(z * z + LONGITUDINAL_PART * shear * eos.rho0) ** 0.5
 
 
@@ -171,11 +173,11 @@ class Stress:
 
         held: what the cells hold, in the order of HELD_ARRAYS.
         """
-        state, *others = held
+        state, *void_arrays = held
         inside = state[:, 1:-1, 1:-1]
         temperature = None
         if self.law.needs_temperature:
-            temperature = compute_temperature(block.eos, inside, *others)
+            temperature = compute_temperature(block.eos, inside, *void_arrays)
         return inside[RHO], inside[P], temperature
 
     def _find_shear(self, block: Any, held: Sequence[np.ndarray]) -> np.ndarray:

@@ -72,20 +72,20 @@ class StrengthLaw:
         return np.zeros(np.shape(density))
 
 
-def make_law(where: str, given: Mapping[str, Any], laws: Mapping[str, type], rho0: float) -> Any:
+def make_law(where: str, table: Mapping[str, Any], laws: Mapping[str, type], rho0: float) -> Any:
     """The law of a table such as {law = "perfect", shear_modulus = ..., yield_strength = ...}.
 
     where: begins the sentence of a BadInput; laws: those known, by kind; rho0: density at rest of
     the material [kg/m³].  Raises BadInput for a law that is not known, and for parameters that it
     lacks or does not have.
     """
-    numbers = dict(given)
+    numbers = dict(table)
     kind = numbers.pop("law", None)
     if kind not in laws:
         known = ", ".join(laws)
         raise BadInput(f"{where}: law is {kind!r}; the laws of strength are {known}")
-    law = laws[kind]
-    parameters = {law.keys.get(field.name, field.name): field for field in fields(law)}
+    law_class = laws[kind]
+    parameters = {law_class.keys.get(field.name, field.name): field for field in fields(law_class)}
     for name in numbers:
         if name not in parameters:
             raise BadInput(
@@ -102,6 +102,6 @@ def make_law(where: str, given: Mapping[str, Any], laws: Mapping[str, type], rho
     if missing:
         raise BadInput(f"{where}: the law {kind!r} needs {', '.join(missing)} besides")
     try:
-        return law(**{parameters[name].name: value for name, value in numbers.items()})
+        return law_class(**{parameters[name].name: value for name, value in numbers.items()})
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None

@@ -85,7 +85,7 @@ class SteinbergCochranGuinan(StrengthLaw):
     def _stiffen(self, density, pressure, temperature) -> np.ndarray:
         """G/G0, 0 where the material has melted."""
         compression = np.divide(density, self.rho0)
-        part = 1.0 + self.pressure_slope * pressure * compression ** (-1.0 / 3.0)
-        part = part - self.temperature_slope * (temperature - ROOM_TEMPERATURE)
+        factor = 1.0 + self.pressure_slope * pressure * compression ** (-1.0 / 3.0)
+        factor = factor - self.temperature_slope * (temperature - ROOM_TEMPERATURE)
         solid = temperature < self.melting_point(density)
-        return np.where(solid, np.maximum(part, 0.0), 0.0)
+        return np.where(solid, np.maximum(factor, 0.0), 0.0)

@@ -8,7 +8,7 @@ from shockgrid.hydro import phases
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas, StiffenedGas
-from shockgrid.hydro.facets.lines import fill_slopes
+from shockgrid.hydro.facets.lines import fill_line_slopes
 from shockgrid.hydro.facets.rows import (
     AREAS,
     CLOSED,
@@ -119,7 +119,7 @@ def test_contact_does_not_pull():
     for half, nodes in ((mine, line), (other, line[:, :3])):
         half.states[RHO] = rho
         half.states[STATE_C] = c
-        fill_slopes(nodes, half)
+        fill_line_slopes(nodes, half)
     other.states[U] = 5.0
     other.states[V] = 0.1, -0.1  # the first flies off, the second comes
     closed, pulled = solve_facets(mine, other, pieces, count, 0.0, 0.0)

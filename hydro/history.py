@@ -1,8 +1,8 @@
 """The columns of a flow's history, in groups; a new group is one function and one line.
 
 A group is a function that takes the flow after a step and returns numbers by column name, with the
-same names at every step.  The groups of COLUMNS are in every history; those of other packages are
-included if a deck names them in `output.columns`.
+same names at every step.  The groups of COLUMNS are in every history; those of other packages, of
+files and of `shockgrid.register` are included if a deck names them in `output.columns`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from shockgrid.hydro.step import Flow
-from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.quality import measure_worst
 from shockgrid.regrid.plug_ins import PlugIns
 
@@ -120,21 +120,14 @@ def compute_columns(flow: Flow) -> dict[str, float | int]:
 
 
 INSTALLED = PlugIns("shockgrid.columns")
-
-
-def find_columns(names: Sequence[str]) -> list[ColumnGroup]:
-    """The groups of installed packages by name; BadInput with the nearest name."""
-    for name in names:
-        if name not in INSTALLED:
-            raise BadInput(
-                f"deck: output.columns: no installed package has a group of history columns "
-                f"{name!r}{suggest(name, INSTALLED)}"
-            )
-    return [INSTALLED[name] for name in names]
+REGISTERED: dict[str, ColumnGroup] = {}  # in this process, by `shockgrid.register`
 
 
 def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dict[str, Any]:
-    """The columns of chosen groups; BadInput if the evolution is not a flow on blocks."""
+    """The columns of chosen groups.
+
+    Raises BadInput if the evolution is not a flow on blocks, or a group does not return a dict.
+    """
     if not groups:
         return {}
     flow = getattr(evolution, "flow", None)
@@ -144,5 +137,12 @@ def compute_chosen_columns(evolution: Any, groups: Sequence[ColumnGroup]) -> dic
         )
     row: dict[str, Any] = {}
     for compute in groups:
-        row |= compute(flow)
+        found = compute(flow)
+        if not isinstance(found, dict):
+            name = getattr(compute, "__name__", "a group")
+            raise BadInput(
+                f"deck: output.columns: {name} returned {type(found).__name__}; it must return a "
+                "dict of numbers by column name"
+            )
+        row |= found
     return row

@@ -161,7 +161,7 @@ class Output(DeckTable, kw_only=True):
     precision: key(Literal["double", "single"], "precision of light dumps") = "double"
     compression: key(int, "level of gzip for light dumps; 0: none", ge=0, le=9) = 0
     restart_every: key(float, "wall seconds between restart points; 0: none", ge=0) = 300.0
-    columns: key(tuple[str, ...], "groups of history columns of other packages, by name") = ()
+    columns: key(tuple[str, ...], "groups of history columns: a name, or FILE.py:FUNCTION") = ()
 
     @property
     def light(self) -> bool:
@@ -248,7 +248,7 @@ class Deck(DeckTable, kw_only=True):
         every deck; a deck with other files places these (`place_own_files`).
         """
         names: list[str] = []
-        placed = _place_materials(self, folder, names)
+        placed = _place_columns(_place_materials(self, folder, names), folder, names)
         placed = placed.place_own_files(folder, names)
         digests = compute_digests(names, self.digests)
         return msgspec.structs.replace(placed, digests=digests)
@@ -333,6 +333,23 @@ def _place_materials(value: Any, folder: Path, names: list[str]) -> Any:
             names += [file, *tables]
             return f"{file}:{found[2]}"
     return value
+
+
+COLUMNS_OF_FILE = re.compile(r"([^\n]+\.py):(\w+)")  # FILE.py:FUNCTION in output.columns
+
+
+def _place_columns(deck: Deck, folder: Path, names: list[str]) -> Deck:
+    """The deck with full paths of the files of its history columns; these are appended."""
+    placed = []
+    for name in deck.output.columns:
+        if of_file := COLUMNS_OF_FILE.fullmatch(name):
+            names.append(find_file(of_file[1], folder))
+            name = f"{names[-1]}:{of_file[2]}"
+        placed.append(name)
+    if not placed:
+        return deck
+    output = msgspec.structs.replace(deck.output, columns=tuple(placed))
+    return msgspec.structs.replace(deck, output=output)
 
 
 TABLE_KEY = "path"  # of a material: its file with a table of pressures

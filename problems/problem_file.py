@@ -11,12 +11,13 @@ import ast
 import hashlib
 import sys
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
 
-from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.text_files import check_regular
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class ProblemFile:
 
 
 _LOADED: dict[tuple[str, str], ProblemFile] = {}  # by path and digest
+_FUNCTION_FILES: dict[tuple[str, str], ModuleType] = {}  # other files that were run, alike
 
 
 def is_problem_file(name: object) -> bool:
@@ -74,6 +76,25 @@ def read_problem_file(
     return found
 
 
+def read_function(path: Path | str, name: str, promise: str) -> Callable[..., Any]:
+    """Run a file and find its function `name`; the same content at the same place is run once.
+
+    promise: what such a function is, for the message.  Raises BadInput with the line for a file
+    that is missing or cannot be run, and for a name that is no function of it.
+    """
+    path = Path(path)
+    text = _read(path)
+    key = str(path.resolve()), compute_digest(text)
+    if key not in _FUNCTION_FILES:
+        _FUNCTION_FILES[key] = _run(path, text, path.stem, path.parent)
+    module = _FUNCTION_FILES[key]
+    found = vars(module).get(name)
+    if not isinstance(found, FunctionType):
+        own = [one for one, value in vars(module).items() if isinstance(value, FunctionType)]
+        raise BadInput(f"{path} has no function {name!r}{suggest(name, own)}; {promise}")
+    return found
+
+
 def compute_digest(text: bytes) -> str:
     """The digest by which the content of a file is known."""
     return hashlib.sha256(text).hexdigest()
@@ -104,6 +125,7 @@ def _read(path: Path) -> bytes:
 def describe_mistake(error: BaseException) -> str:
     """A sentence where an error came from a file that is a problem, with its line; else ""."""
     files = {str(found.path) for found in _LOADED.values()}
+    files |= {str(module.__file__) for module in _FUNCTION_FILES.values()}
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         if frame.filename in files:
             return (

@@ -49,7 +49,7 @@ def describe_installed() -> list[str]:
     plug_ins = {group: find_plug_ins(group) for group in GROUPS}
     if not any(plug_ins.values()):
         return []
-    from shockgrid.hydro.boundary import OWN as OWN_SEGMENTS
+    from shockgrid.hydro.boundary import OWN_SEGMENTS
     from shockgrid.hydro.eos import OWN as OWN_EQUATIONS
     from shockgrid.hydro.history import COLUMNS
     from shockgrid.hydro.strength.laws import OWN as OWN_STRENGTH_LAWS

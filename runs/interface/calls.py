@@ -6,7 +6,7 @@ import hashlib
 import os
 import re
 import sys
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from shockgrid.hydro.boundary import SEGMENTS, Segment
 from shockgrid.hydro.eos import EQUATIONS_OF_STATE
 from shockgrid.hydro.eos.base import EquationOfState
+from shockgrid.hydro.history import INSTALLED, REGISTERED
 from shockgrid.hydro.strength.laws import STRENGTH_LAWS, StrengthLaw
 from shockgrid.problems.evolution import Evolution, get_material
 from shockgrid.problems.own_simulation import Measure, OwnSimulation, OwnSimulationDeck
@@ -250,21 +251,29 @@ PLAIN = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 _OWN: dict[tuple[str, str], str] = {}  # what was registered here: kind and name, and its class
 
 
-def register(name: str, thing: type) -> None:
-    """Register a class by name: a problem, equation of state, law of strength, boundary kind or
-    regridder.
+def register(
+    name: str, thing: type | Callable[..., Any], *, units: Mapping[str, str] | None = None
+) -> None:
+    """Register by name a class (a problem, equation of state, law of strength, boundary kind or
+    regridder) or a function: a group of history columns, for `output.columns` of a deck.
 
-    A regridder is a class with a method `regrid(previous, boundary)`.  A new version of a class
-    may be registered again under its name.  Raises BadInput for any other class, for a name that
-    is taken, and for one with characters other than lower-case letters, digits and hyphens.
+    A regridder is a class with a method `regrid(previous, boundary)`.  A group
+    of columns takes the flow after a step and returns numbers by column name; units: of these
+    columns.  A new version may be registered again under its name.  Raises BadInput for any other
+    thing, for a name that is taken, and for one with characters other than lower-case letters,
+    digits and hyphens.
     """
-    if not isinstance(thing, type):
+    if not callable(thing):
         raise BadInput(
-            f"{name!r}: only classes can be registered, not a {type(thing).__name__}; a history "
-            "column needs a package with an entry point or a line in hydro.history.COLUMNS"
+            f"{name!r}: only classes and functions can be registered, not a {type(thing).__name__}"
         )
     if not PLAIN.fullmatch(name):
         raise BadInput(f"{name!r} is not a valid name: use lower-case letters, digits and hyphens")
+    if not isinstance(thing, type):
+        _register_columns(name, thing, dict(units or {}))
+        return
+    if units is not None:
+        raise BadInput(f"{name!r}: units are those of a function's history columns")
     place = f"{thing.__module__}:{thing.__qualname__}"
     kinds: tuple[tuple[str, MutableMapping[str, Any], bool, Any], ...] = (
         ("problem", PROBLEMS, issubclass(thing, Problem), place),
@@ -287,3 +296,12 @@ def register(name: str, thing: type) -> None:
         f"{thing.__name__} is not a problem, equation of state, law of strength, boundary kind or "
         "regridder: it derives from none of these classes and has no method `regrid`"
     )
+
+
+def _register_columns(name: str, group: Callable[..., Any], units: dict[str, str]) -> None:
+    """A group of history columns with its units."""
+    if name in INSTALLED:
+        raise BadInput(f"there is a group of history columns {name!r} already; choose another name")
+    if units:
+        group.units = units  # type: ignore[attr-defined]
+    REGISTERED[name] = group

@@ -14,8 +14,9 @@ from operator import attrgetter
 
 import msgspec
 
-from shockgrid.hydro.history import compute_chosen_columns, find_columns
+from shockgrid.hydro.history import compute_chosen_columns
 from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.column_groups import find_columns
 from shockgrid.problems.deck import Deck, Output, Regrid
 from shockgrid.problems.evolution import Evolution, get_node_fields
 from shockgrid.problems.problem import Problem, check_memory

@@ -26,7 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.hydro.history import compute_chosen_columns, find_columns
+from shockgrid.hydro.history import compute_chosen_columns
+from shockgrid.problems.column_groups import find_columns
 from shockgrid.problems.deck import Output
 from shockgrid.problems.evolution import Evolution, get_missed, get_start_row
 from shockgrid.problems.problem import Problem

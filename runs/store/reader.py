@@ -403,13 +403,22 @@ class RunData:
         return Table(read_columns(found), "history", "step", self.find_units)
 
     def find_units(self) -> dict[str, str]:
-        """Units of the history's columns: those of every run, and what the problem says."""
+        """Units of the history's columns: those of every run, of the problem and of the groups
+        that the deck names."""
         seconds = (name for name in self.history if name.startswith("seconds_"))
         units = dict.fromkeys(("t", "dt", *seconds), "s")
         try:
             own = self.problem.find_units()
-            return units | (UNITS_OF_CONTACTS if own["t"] != "1" else {}) | own
+            units |= (UNITS_OF_CONTACTS if own["t"] != "1" else {}) | own
         except BadInput:  # a deck of another version can still be drawn
+            return units
+        if not (columns := self.problem.deck.output.columns):
+            return units
+        from shockgrid.problems.column_groups import find_column_units  # slow to load
+
+        try:
+            return units | find_column_units(columns)
+        except BadInput:  # a file of columns that is gone
             return units
 
     @property

@@ -58,6 +58,7 @@ ROOMS = (
     ("problems.deck", "problems.evolution", "problems.pictures"),
     ("problems.problem",),
     ("problems.problem_file", "problems.own_simulation"),
+    ("problems.column_groups",),
     ("problems.registry", "problems.grid_march"),
     ("problems.references",),
     ("problems.initial_states", "problems.solids"),
@@ -127,6 +128,21 @@ def test_no_circles_of_imports():
         sorter.prepare()
     except graphlib.CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_names_that_are_imported_exist():
+    """Those inside functions, too, which no start would notice."""
+    missing = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not str(node.module).startswith("shockgrid"):
+                continue
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                inside = f"{node.module}.{alias.name}"
+                if not hasattr(module, alias.name) and importlib.util.find_spec(inside) is None:
+                    missing.append(f"{name_module(path)}:{node.lineno}: {inside}")
+    assert not missing, missing
 
 
 def test_imports_point_one_way():

@@ -63,7 +63,7 @@ def test_wrong_keywords_are_told_without_words_of_the_command_line(settings, wor
 
 
 def test_a_mistake_beside_keywords_says_that_it_is_in_them(tmp_path):
-    with pytest.raises(sg.BadInput, match=r"and the keywords: output\.columns: no installed"):
+    with pytest.raises(sg.BadInput, match=r"and the keywords: output\.columns: there is no"):
         sg.run(NAME, tmp_path / "run", output={"columns": ["none"]}, **DECK)
 
 
@@ -387,7 +387,7 @@ def test_a_restart_with_other_columns_is_refused_before_it_writes(stopped, again
         ({"output": {"times": [99.0]}}, r"output\.times has 99, which is after the end"),
         ({"output": {"fields": ["roh"]}}, "output.fields has 'roh'; no block has such a field"),
         ({"gauge": [{"name": "g", "at": [0.1, 0.1], "fields": ["roh"]}]}, "roh"),
-        ({"output": {"columns": ["nosuch"]}}, "no installed package has a group"),
+        ({"output": {"columns": ["nosuch"]}}, "there is no group of history columns"),
     ],
 )
 def test_what_cannot_be_written_down_is_refused_before_there_is_a_directory(

@@ -38,9 +38,8 @@ MOST_LONGER = 1.5  # a step that was cut too short
 # of a step: a touch that comes so shortly before or after its end is at its end
 REACHED_TOUCH_PART = 1e-6
 ROUND_OFF_AXIS_DISTANCE = 1e-12  # of a surface's length: ends so near to the axis are on it
-# of the longest face: so far, besides their own ways, nodes are pushed apart in a step in which
-# those behind the other line go back all of the way
-MOST_PUSHED_PART = 0.3
+# of the speed of sound: so fast, besides their own motion, nodes are pushed apart
+PUSHED_SOUND_PART = 0.2
 RETURN_PART = 0.2  # part that nodes behind the other line are taken back in a stable step
 
 
@@ -215,8 +214,8 @@ class Meetings:
         self._lay([pair for pair in awake if pair.touched], part_back)
         # bodies that lie in each other even so
         if any(pair.touched or pair in self.touching for pair in awake if not pair.one_body):
-            longest = max(surface.longest for surface in self.surfaces)
-            self.bodies.push_apart(self._most + MOST_PUSHED_PART * part_back * longest)
+            sound = max(float(surface.segment.rim.c.max()) for surface in self.surfaces)
+            self.bodies.push_apart(self._most + PUSHED_SOUND_PART * sound * dt)
         # what that has changed beside them
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()

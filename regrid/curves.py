@@ -4,8 +4,8 @@ A spacing is an increasing sequence from 0 to 1 that gives the positions of a li
 Equidistribution (ED1, theory R10.1) makes weight times interval equal on all intervals.  Note: a
 weight that is known only at the old nodes must be integrated first, and the integral interpolated
 monotonically and inverted; if the weight itself is interpolated, nodes can cross.  A spacing by
-turning (theory R9.2) concentrates nodes where a line bends: a segment may turn by TURN, and at
-least LEAST_EVEN of the nodes keep the initial spacing.
+turning (theory R9.2) concentrates nodes where a line bends: a segment may turn by
+SEGMENT_TURN, and at least LEAST_EVEN_SHARE of the nodes keep the initial spacing.
 
 Respaced nodes (theory R9) stay on the curve, a straight line stays straight to round-off, and no
 node passes another.  Note: a spline through a whole line would round off its corners, so it breaks
@@ -23,13 +23,24 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shockgrid.regrid.errors import BadInput, RegridFailure
-from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.jit import inlined, kernel
 from shockgrid.regrid.roots import find_root
 
 SETTLED_PRODUCT_SPREAD = 1e-9  # relative spread of products that passes for equal
 REFINED_STEP_RATIO = 1.15  # of neighbouring steps where a line is refined towards one end
 # nodes of a line over those within which steps grow by e towards the far ones
 NODES_OF_E_FOLD = 5.0
+SEGMENT_TURN = np.radians(10.0)  # that one segment takes where nodes suffice
+# least part of the nodes that keep the first spacing: without them, nodes that go to a kink would
+# leave the tips of bubbles and spikes to segments many times longer than at first
+LEAST_EVEN_SHARE = 0.5
+TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
+# up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
+SYMMETRIC_SEGMENT = 1e-9
+SYMMETRIC_TURNING = 1e-7
+ROUNDING_OF_SPACING = 1e-12  # up to which a spacing differs from its image by rounding
+SHAPES = ("chord", "spline")
+FREE_END = (0.0, 0.0)
 
 
 def uniform_spacing(count: int) -> np.ndarray:
@@ -73,8 +84,8 @@ def clustered_spacing(count: int, first: float, at_end: bool = False) -> np.ndar
         if abs(log_ratio) < 1e-12:
             return -np.log(steps) - np.log(first)
         growth = np.log(np.expm1(abs(log_ratio)) / -np.expm1(-steps * abs(log_ratio)))
-        last = growth - abs(log_ratio)
-        return (growth - steps * abs(log_ratio) if log_ratio > 0.0 else last) - np.log(first)
+        log_step = growth - abs(log_ratio)
+        return (growth - steps * abs(log_ratio) if log_ratio > 0.0 else log_step) - np.log(first)
 
     bound = 1.0
     while excess(bound) > 0.0 or excess(-bound) < 0.0:
@@ -86,62 +97,62 @@ def clustered_spacing(count: int, first: float, at_end: bool = False) -> np.ndar
 
 @kernel
 def fill_grown_spacing(least, length, at_end, spacing):
-    """Law (n,) of a line whose steps grow from `least` at one end, as `meeting_laws` says."""
-    number = spacing.shape[0] - 1
-    step = length / number
-    q = max(0.0, 1.0 - NODES_OF_E_FOLD / number)
-    total = 0.0
+    """Spacing (n,) of a line whose steps grow from `least` at one end, as in `meeting_laws`."""
+    steps = spacing.shape[0] - 1
+    step = length / steps
+    decay = max(0.0, 1.0 - NODES_OF_E_FOLD / steps)
+    sum_of_powers = 0.0
     power = 1.0
-    for _ in range(number):
-        total += power
-        power *= q
-    far = (length - least * total) / (number - total)
-    grows = step > least * (1.0 + 1e-9)
+    for _ in range(steps):
+        sum_of_powers += power
+        power *= decay
+    farthest_step = (length - least * sum_of_powers) / (steps - sum_of_powers)
+    must_grow = step > least * (1.0 + 1e-9)
     power = 1.0
     position = 0.0
-    spacing[number if at_end else 0] = 1.0 if at_end else 0.0
-    for k in range(1, number):
-        position += far - (far - least) * power if grows else step
-        power *= q
+    spacing[steps if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, steps):
+        position += farthest_step - (farthest_step - least) * power if must_grow else step
+        power *= decay
         if at_end:
-            spacing[number - k] = 1.0 - position / length
+            spacing[steps - k] = 1.0 - position / length
         else:
             spacing[k] = position / length
-    spacing[0 if at_end else number] = 0.0 if at_end else 1.0
+    spacing[0 if at_end else steps] = 0.0 if at_end else 1.0
 
 
 @kernel
 def fill_refined_spacing(least, length, at_end, spacing):
-    """Law (n,) of a line whose steps grow from `least` at one end by REFINED_STEP_RATIO each, then
-    are even.
+    """Spacing (n,) of a line whose steps grow from `least` at one end, then are even.
 
+    Each growing step is REFINED_STEP_RATIO times as long as the one before.
     Falls back on `fill_grown_spacing` where even steps would be shorter, or growing ones too few.
     """
-    number = spacing.shape[0] - 1
-    # of the growing steps; the step that comes next
-    total = 0.0
-    last = least
-    even = 0.0
-    for k in range(number):
-        even = (length - total) / (number - k)
-        if even <= last:
+    steps = spacing.shape[0] - 1
+    # length of the growing steps, the next one of them, and what would be left for even ones
+    grown_length = 0.0
+    growing_step = least
+    even_step = 0.0
+    for k in range(steps):
+        even_step = (length - grown_length) / (steps - k)
+        if even_step <= growing_step:
             break
-        total += last
-        last *= REFINED_STEP_RATIO
-    if even > last or even < least:
+        grown_length += growing_step
+        growing_step *= REFINED_STEP_RATIO
+    if even_step > growing_step or even_step < least:
         fill_grown_spacing(least, length, at_end, spacing)
         return
     position = 0.0
     step = least
-    spacing[number if at_end else 0] = 1.0 if at_end else 0.0
-    for k in range(1, number):
-        position += min(step, even)
+    spacing[steps if at_end else 0] = 1.0 if at_end else 0.0
+    for k in range(1, steps):
+        position += min(step, even_step)
         step *= REFINED_STEP_RATIO
         if at_end:
-            spacing[number - k] = 1.0 - position / length
+            spacing[steps - k] = 1.0 - position / length
         else:
             spacing[k] = position / length
-    spacing[0 if at_end else number] = 0.0 if at_end else 1.0
+    spacing[0 if at_end else steps] = 0.0 if at_end else 1.0
 
 
 def meeting_laws(
@@ -179,14 +190,14 @@ def equidistribute(nodes: np.ndarray, weight: np.ndarray, count: int | None = No
     integral = np.concatenate([[0.0], np.cumsum(on_steps * np.abs(np.diff(nodes)))])
     levels = integral[-1] * uniform_spacing(count or nodes.size)
     if weight.size < nodes.size:
-        found = np.interp(levels, integral, nodes)
+        new_nodes = np.interp(levels, integral, nodes)
     else:
         from scipy.interpolate import PchipInterpolator  # slow to load
 
-        found = PchipInterpolator(integral, nodes)(levels)
-    found[0] = nodes[0]
-    found[-1] = nodes[-1]
-    return found
+        new_nodes = PchipInterpolator(integral, nodes)(levels)
+    new_nodes[0] = nodes[0]
+    new_nodes[-1] = nodes[-1]
+    return new_nodes
 
 
 def solve_ed1(
@@ -225,9 +236,9 @@ def correct_polevikov(nodes: np.ndarray, speed: np.ndarray, floor: float = 1e-6)
     if not sums.max() > 0.0:
         return np.linspace(nodes[0], nodes[-1], nodes.size)
     spacing = np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(sums, floor * sums.max()))])
-    found = nodes[0] + (nodes[-1] - nodes[0]) * (spacing / spacing[-1])
-    found[-1] = nodes[-1]
-    return found
+    new_nodes = nodes[0] + (nodes[-1] - nodes[0]) * (spacing / spacing[-1])
+    new_nodes[-1] = nodes[-1]
+    return new_nodes
 
 
 def solve_polevikov(
@@ -246,10 +257,12 @@ def solve_polevikov(
     size = np.abs(speed(fine))
     if not size.max() > 0.0:
         return np.linspace(start, end, count)
-    least = floor * size.max()
+    least_speed = floor * size.max()
     return equalise_products(
-        lambda left, right: np.maximum(np.abs(speed(left)) + np.abs(speed(right)), 2.0 * least),
-        equidistribute(fine, np.maximum(size, least), count),
+        lambda left, right: np.maximum(
+            np.abs(speed(left)) + np.abs(speed(right)), 2.0 * least_speed
+        ),
+        equidistribute(fine, np.maximum(size, least_speed), count),
     )
 
 
@@ -316,122 +329,139 @@ def equalise_products(
     return x
 
 
-TURN = np.radians(10.0)  # that one segment takes where nodes suffice
-# least part of the nodes that keep the first spacing: without them, nodes that go to a kink would
-# leave the tips of bubbles and spikes to segments many times longer than at first
-LEAST_EVEN = 0.5
-TURNING_SMOOTHINGS = 3  # of the turning, over neighbouring segments
-# up to which a line counts as symmetric: parts of the mean segment, and of a segment that is wanted
-SYMMETRIC_SEGMENT = 1e-9
-SYMMETRIC_TURNING = 1e-7
-ROUNDING_OF_SPACING = 1e-12  # up to which a spacing differs from its image by rounding
+@inlined
+def take_segment(line, k):
+    """Segment k of a polyline (2, n): x and y."""
+    return line[0, k + 1] - line[0, k], line[1, k + 1] - line[1, k]
+
+
+@inlined
+def measure_end_turn(segment, normal):
+    """Angle by which a line turns at a wall: to its mirror image; 0 at a free end.
+
+    From the parts of the end's segment along and across the wall's normal.
+    """
+    x, y = segment
+    normal_x, normal_y = normal
+    if normal_x == 0.0 and normal_y == 0.0:
+        return 0.0
+    along = abs(normal_x * x + normal_y * y)
+    across = abs(normal_x * y - normal_y * x)
+    return 2.0 * np.arctan2(across, along)
+
+
+@kernel
+def fill_turns(line, closed, wall_first, wall_last, turns):
+    """Angles (n,) by which a line turns at its nodes; line, ends as in `fill_turning_spacing`."""
+    edges = turns.shape[0] - 1
+    for k in range(edges + 1):
+        is_end = k == 0 or k == edges
+        if is_end and not closed:
+            segment = take_segment(line, 0 if k == 0 else edges - 1)
+            turns[k] = measure_end_turn(segment, wall_first if k == 0 else wall_last)
+            continue
+        ax, ay = take_segment(line, edges - 1 if is_end else k - 1)
+        bx, by = take_segment(line, 0 if is_end else k)
+        turns[k] = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 @kernel
 def fill_turning(line, closed, wall_first, wall_last, wanted):
-    """Numbers of segments that each segment's turning needs: wanted (n - 1,); line, ends as
-    below."""
-    count = line.shape[1]
-    edges = count - 1
-    # angle by which the line turns at each node
-    turn = np.empty(count)
-    for k in range(count):
-        before = max(k - 1, 0)
-        after = min(k, edges - 1)
-        if closed and (k == 0 or k == edges):
-            before = edges - 1
-            after = 0
-        ax, ay = line[0, before + 1] - line[0, before], line[1, before + 1] - line[1, before]
-        bx, by = line[0, after + 1] - line[0, after], line[1, after + 1] - line[1, after]
-        if before == after:  # an end: its mirror image's segment, along and across the normal
-            nx, ny = wall_first if k == 0 else wall_last
-            along = abs(nx * ax + ny * ay)
-            across = abs(nx * ay - ny * ax)
-            turn[k] = 2.0 * np.arctan2(across, along)
-            if nx == 0.0 and ny == 0.0:
-                turn[k] = 0.0
-        else:
-            turn[k] = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
-    # segments of the angle TURN each, smoothed along the line (R9.2)
+    """Numbers of segments that each segment's turning needs: wanted (n - 1,).
+
+    Line and ends as in `fill_turning_spacing`.
+    """
+    edges = line.shape[1] - 1
+    turns = np.empty(edges + 1)
+    fill_turns(line, closed, wall_first, wall_last, turns)
+    # segments of the angle SEGMENT_TURN each
     for k in range(edges):
-        wanted[k] = 0.5 * (turn[k] + turn[k + 1]) / TURN
+        wanted[k] = 0.5 * (turns[k] + turns[k + 1]) / SEGMENT_TURN
+    # smoothed along the line (R9.2)
     for _ in range(TURNING_SMOOTHINGS):
-        start = wanted[0]
+        first = wanted[0]
         last = wanted[edges - 1]
-        before = last if closed else start
+        before = last if closed else first
         for k in range(edges):
-            after = wanted[k + 1] if k + 1 < edges else (start if closed else last)
-            here = wanted[k]
-            wanted[k] = 0.5 * here + 0.25 * (before + after)
-            before = here
+            after = wanted[k + 1] if k + 1 < edges else (first if closed else last)
+            unsmoothed = wanted[k]
+            wanted[k] = 0.5 * unsmoothed + 0.25 * (before + after)
+            before = unsmoothed
 
 
 @kernel
-def fill_turning_spacing(line, first, turning, closed, wall_first, wall_last, shortest, spacing):
-    """Spacing (n,) of a line (2, n): places by length from 0 to 1.
+def fill_turning_spacing(
+    line, first_spacing, turning, closed, wall_first, wall_last, shortest, spacing
+):
+    """Spacing (n,) of a line (2, n): positions by length from 0 to 1.
 
-    `first` (n,) is the spacing where the line bends no more than it did at first, when it had
-    `turning` (n - 1,), see `fill_turning`: a line that only moves along keeps its nodes, so that a
-    uniform flow along a bent line stays uniform.  `shortest` [m]: turning asks for no shorter
-    segments.  The line is closed (its last node is the first or its periodic image), or ends on
-    walls, given by their unit normals, at its own mirror image; (0, 0) is a free end.
+    `first_spacing` (n,) is the spacing where the line bends no more than it did at first, when it
+    had `turning` (n - 1,), see `fill_turning`: a line that only moves along keeps its nodes, so
+    that a uniform flow along a bent line stays uniform.  `shortest` [m]: turning asks for no
+    shorter segments.  The line is closed (its last node is the first or its periodic image), or
+    ends on walls, given by their unit normals, at its mirror image; (0, 0) is a free end.
     """
     count = line.shape[1]
     edges = count - 1
     arc = np.empty(count)
+    # segments that each one's turning needs, and the share of them that it receives
     wanted = np.empty(edges)
     fill_arc_lengths(line, arc)
     fill_turning(line, closed, wall_first, wall_last, wanted)
-    for k in range(edges):
-        wanted[k] = max(wanted[k] - turning[k], 0.0)
     total = 0.0
     for k in range(edges):
+        wanted[k] = max(wanted[k] - turning[k], 0.0)
         wanted[k] = min(wanted[k], (arc[k + 1] - arc[k]) / shortest)
         total += wanted[k]
-    even = max(1.0 - total / edges, LEAST_EVEN)
-    granted = min(1.0, (1.0 - even) * edges / total) if total > 0.0 else 1.0
-    # the number of segments up to node k, and the places where it is whole
+    even_share = max(1.0 - total / edges, LEAST_EVEN_SHARE)
+    granted_share = min(1.0, (1.0 - even_share) * edges / total) if total > 0.0 else 1.0
+    # the number of segments up to node k is its level; a node lies wherever that is whole
     spacing[0] = 0.0
     spacing[edges] = 1.0
-    done = 0.0
-    following = 1
-    place = 0
-    before = 0.0
+    turning_so_far = 0.0
+    next_node = 1
+    even_node = 0
+    level_before = 0.0
     for k in range(edges):
-        reached = arc[k + 1] / arc[edges]
-        while place < edges - 1 and first[place + 1] < reached:
-            place += 1
-        evenly = place + (reached - first[place]) / (first[place + 1] - first[place])
-        done += wanted[k]
-        after = even * evenly + granted * done
-        while following < edges and following <= after:
-            part = (following - before) / (after - before)
-            spacing[following] = (arc[k] + part * (arc[k + 1] - arc[k])) / arc[edges]
-            following += 1
-        before = after
-    for k in range(following, edges):  # round-off at the end
-        spacing[k] = 1.0 - (edges - k) * (1.0 - spacing[following - 1]) / (edges - following + 1)
-    even_out_spacing(arc, first, wanted, spacing)
+        position = arc[k + 1] / arc[edges]
+        while even_node < edges - 1 and first_spacing[even_node + 1] < position:
+            even_node += 1
+        interval = first_spacing[even_node + 1] - first_spacing[even_node]
+        even_level = even_node + (position - first_spacing[even_node]) / interval
+        turning_so_far += wanted[k]
+        level_after = even_share * even_level + granted_share * turning_so_far
+        while next_node < edges and next_node <= level_after:
+            fraction = (next_node - level_before) / (level_after - level_before)
+            spacing[next_node] = (arc[k] + fraction * (arc[k + 1] - arc[k])) / arc[edges]
+            next_node += 1
+        level_before = level_after
+    # nodes that round-off leaves over at the end
+    for k in range(next_node, edges):
+        spacing[k] = 1.0 - (edges - k) * (1.0 - spacing[next_node - 1]) / (edges - next_node + 1)
+    even_out_spacing(arc, first_spacing, wanted, spacing)
 
 
 @kernel
-def even_out_spacing(arc, first, wanted, spacing):
+def even_out_spacing(arc, first_spacing, wanted, spacing):
     """Make a spacing (n,) symmetric where its line is so up to rounding; theory R9.
 
     arc [m], first spacing (n,), wanted (n - 1,) segments: of the line, see `fill_turning_spacing`.
-    Spacings by turning magnify rounding step by step where a line has too few nodes for that.
+    Spacings by turning magnify rounding step by step where a line has too few nodes for its turns.
     """
+    # comparisons are negated so that a line with a NaN does not count as symmetric
     edges = arc.shape[0] - 1
-    most = SYMMETRIC_SEGMENT * arc[edges] / edges
+    tolerance = SYMMETRIC_SEGMENT * arc[edges] / edges
     for k in range(edges // 2):
-        other = edges - 1 - k
+        mirrored = edges - 1 - k
         length = arc[k + 1] - arc[k]
-        if not abs(length - (arc[other + 1] - arc[other])) <= most:
+        if not abs(length - (arc[mirrored + 1] - arc[mirrored])) <= tolerance:
             return
-        if not abs(wanted[k] - wanted[other]) <= SYMMETRIC_TURNING:
+        if not abs(wanted[k] - wanted[mirrored]) <= SYMMETRIC_TURNING:
             return
-        if not abs(first[k] - (1.0 - first[edges - k])) <= SYMMETRIC_SEGMENT / edges:
+        mirrored_position = 1.0 - first_spacing[edges - k]
+        if not abs(first_spacing[k] - mirrored_position) <= SYMMETRIC_SEGMENT / edges:
             return
+    # the mean of the spacing and its mirror image
     departure = 0.0
     for k in range(edges // 2 + 1):
         departure = max(departure, abs(spacing[k] - (1.0 - spacing[edges - k])))
@@ -439,10 +469,6 @@ def even_out_spacing(arc, first, wanted, spacing):
         for k in range(edges // 2 + 1):
             spacing[k] = 0.5 * (spacing[k] + (1.0 - spacing[edges - k]))
             spacing[edges - k] = 1.0 - spacing[k]
-
-
-SHAPES = ("chord", "spline")
-FREE_END = (0.0, 0.0)
 
 
 @kernel
@@ -475,66 +501,89 @@ def fill_positions(arc, spacing, first, last, relax, positions):
     return increasing
 
 
-@kernel
-def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, second):
-    """Second derivatives (2, n) by arc length of the cubic spline through the nodes first..last.
-
-    A wall is given by its unit normal: there the part of the line along the normal is odd (no
-    second derivative), the part along the wall even (no first derivative).  (0, 0) is a free end:
-    no second derivative.  The solve runs in the frame of the first wall, where the two parts are
-    independent up to the last node; `eliminated` (2, n) is scratch.
-    """
-    normal_x, normal_y = wall_first
-    free_first = normal_x == 0.0 and normal_y == 0.0
-    if free_first:
-        normal_x = 1.0
-    # Part 0 is along the wall's normal, part 1 along the wall.
+@inlined
+def begin_curvatures(line, arc, first, normal, is_free, eliminated, second):
+    """First row of the elimination of `fill_curvatures`; returns the slope of the first segment."""
+    normal_x, normal_y = normal
     h = arc[first + 1] - arc[first]
     step_x = line[0, first + 1] - line[0, first]
     step_y = line[1, first + 1] - line[1, first]
+    # component 0 is along the wall's normal, component 1 along the wall
     eliminated[0, first] = 0.0
     second[0, first] = 0.0
-    if free_first:
+    if is_free:
         eliminated[1, first] = 0.0
         second[1, first] = 0.0
     else:
         eliminated[1, first] = 0.5
         second[1, first] = 3.0 * (-normal_y * step_x + normal_x * step_y) / (h * h)
-    rise_x, rise_y = step_x / h, step_y / h
-    for k in range(first + 1, last):
-        ahead = arc[k + 1] - arc[k]
-        ahead_x = (line[0, k + 1] - line[0, k]) / ahead
-        ahead_y = (line[1, k + 1] - line[1, k]) / ahead
-        bend_x, bend_y = 6.0 * (ahead_x - rise_x), 6.0 * (ahead_y - rise_y)
-        right = (normal_x * bend_x + normal_y * bend_y, -normal_y * bend_x + normal_x * bend_y)
-        for c in range(2):
-            pivot = 1.0 / (2.0 * (h + ahead) - h * eliminated[c, k - 1])
-            eliminated[c, k] = ahead * pivot
-            second[c, k] = (right[c] - h * second[c, k - 1]) * pivot
-        h = ahead
-        rise_x = ahead_x
-        rise_y = ahead_y
-    # Last node: n . M = 0 and t . (2 M + M_before) = 6 t . rise / h, in the first wall's frame.
+    return step_x / h, step_y / h
+
+
+@inlined
+def end_curvatures(last, h, slope, normal, wall_last, eliminated, second):
+    """Second derivative at the last node, in the first wall's frame; 0 at a free end.
+
+    There n . M = 0 and t . (2 M + M_before) = 6 t . slope / h, with normal n and tangent t of its
+    wall.
+    """
+    normal_x, normal_y = normal
+    slope_x, slope_y = slope
     last_x, last_y = wall_last
     second[0, last] = 0.0
     second[1, last] = 0.0
     if last_x != 0.0 or last_y != 0.0:
+        # the tangent in this frame
         along_0 = normal_x * -last_y + normal_y * last_x
         along_1 = normal_y * last_y + normal_x * last_x
-        slope = (-last_y * rise_x + last_x * rise_y) * (-6.0 / h)
-        slope -= along_0 * second[0, last - 1] + along_1 * second[1, last - 1]
-        stiff = along_0 * along_0 * (2.0 - eliminated[0, last - 1])
-        stiff += along_1 * along_1 * (2.0 - eliminated[1, last - 1])
-        second[0, last] = along_0 * slope / stiff
-        second[1, last] = along_1 * slope / stiff
+        right_side = (-last_y * slope_x + last_x * slope_y) * (-6.0 / h)
+        right_side -= along_0 * second[0, last - 1] + along_1 * second[1, last - 1]
+        stiffness = along_0 * along_0 * (2.0 - eliminated[0, last - 1])
+        stiffness += along_1 * along_1 * (2.0 - eliminated[1, last - 1])
+        second[0, last] = along_0 * right_side / stiffness
+        second[1, last] = along_1 * right_side / stiffness
+
+
+@kernel
+def fill_curvatures(line, arc, first, last, wall_first, wall_last, eliminated, second):
+    """Second derivatives (2, n) by arc length of the cubic spline through the nodes first..last.
+
+    A wall is given by its unit normal: there the component of the line along the normal is odd (no
+    second derivative), the component along the wall even (no first derivative).  (0, 0) is a free
+    end: no second derivative.  The solve runs in the frame of the first wall, where the two
+    components are independent up to the last node; `eliminated` (2, n) is scratch.
+    """
+    normal_x, normal_y = wall_first
+    is_free = normal_x == 0.0 and normal_y == 0.0
+    if is_free:
+        normal_x = 1.0
+    normal = (normal_x, normal_y)
+    slope_x, slope_y = begin_curvatures(line, arc, first, normal, is_free, eliminated, second)
+    # forward
+    h = arc[first + 1] - arc[first]
+    for k in range(first + 1, last):
+        next_h = arc[k + 1] - arc[k]
+        next_x = (line[0, k + 1] - line[0, k]) / next_h
+        next_y = (line[1, k + 1] - line[1, k]) / next_h
+        jump_x, jump_y = 6.0 * (next_x - slope_x), 6.0 * (next_y - slope_y)
+        right_side = (normal_x * jump_x + normal_y * jump_y, -normal_y * jump_x + normal_x * jump_y)
+        for c in range(2):
+            pivot = 1.0 / (2.0 * (h + next_h) - h * eliminated[c, k - 1])
+            eliminated[c, k] = next_h * pivot
+            second[c, k] = (right_side[c] - h * second[c, k - 1]) * pivot
+        h = next_h
+        slope_x = next_x
+        slope_y = next_y
+    end_curvatures(last, h, (slope_x, slope_y), normal, wall_last, eliminated, second)
+    # backward, and from the wall's frame to x and y
     for k in range(last - 1, first - 1, -1):
         for c in range(2):
             second[c, k] -= eliminated[c, k] * second[c, k + 1]
     for k in range(first, last + 1):
-        part_0 = second[0, k]
-        part_1 = second[1, k]
-        second[0, k] = normal_x * part_0 - normal_y * part_1
-        second[1, k] = normal_y * part_0 + normal_x * part_1
+        along_normal = second[0, k]
+        along_wall = second[1, k]
+        second[0, k] = normal_x * along_normal - normal_y * along_wall
+        second[1, k] = normal_y * along_normal + normal_x * along_wall
 
 
 @kernel
@@ -554,29 +603,29 @@ def fill_closed_curvatures(line, arc, eliminated, second):
         slope = (line[c, 1] - line[c, 0]) / first_h - (line[c, last] - line[c, last - 1]) / end_h
         slopes[c] = 6.0 * slope - first_h * second[c, 1] - end_h * second[c, last - 1]
     # of the elimination; the solution for X = 1
-    factor = eliminated[0]
-    unit = eliminated[1]
-    factor[0] = 0.0
-    unit[0] = 1.0
-    unit[last] = 1.0
+    factors = eliminated[0]
+    unit_solution = eliminated[1]
+    factors[0] = 0.0
+    unit_solution[0] = 1.0
+    unit_solution[last] = 1.0
     h = first_h
     for k in range(1, last):
         ahead = arc[k + 1] - arc[k]
-        pivot = 1.0 / (2.0 * (h + ahead) - h * factor[k - 1])
-        factor[k] = ahead * pivot
-        unit[k] = -h * unit[k - 1] * pivot
+        pivot = 1.0 / (2.0 * (h + ahead) - h * factors[k - 1])
+        factors[k] = ahead * pivot
+        unit_solution[k] = -h * unit_solution[k - 1] * pivot
         h = ahead
     for k in range(last - 1, 0, -1):
-        unit[k] -= factor[k] * unit[k + 1]
-    stiff = 2.0 * (first_h + end_h) + (first_h * unit[1] + end_h * unit[last - 1])
+        unit_solution[k] -= factors[k] * unit_solution[k + 1]
+    stiff = 2.0 * (first_h + end_h) + (first_h * unit_solution[1] + end_h * unit_solution[last - 1])
     for c in range(2):
         for k in range(last + 1):
-            second[c, k] += slopes[c] / stiff * unit[k]
+            second[c, k] += slopes[c] / stiff * unit_solution[k]
 
 
 @kernel
 def fill_on_spline(line, arc, positions, second, first, last, out):
-    """Nodes first..last of `out` at the parameters `places` of the spline through `line`."""
+    """Nodes first..last of `out` at the arc lengths `positions` of the spline through `line`."""
     segment = first
     for k in range(first + 1, last):
         while segment < last - 1 and arc[segment + 1] <= positions[k]:
@@ -584,12 +633,12 @@ def fill_on_spline(line, arc, positions, second, first, last, out):
         h = arc[segment + 1] - arc[segment]
         right = (positions[k] - arc[segment]) / h
         left = 1.0 - right
-        bend_left = (left * left * left - left) * h * h / 6.0
-        bend_right = (right * right * right - right) * h * h / 6.0
+        weight_left = (left * left * left - left) * h * h / 6.0
+        weight_right = (right * right * right - right) * h * h / 6.0
         for c in range(2):
             chord = line[c, segment] + right * (line[c, segment + 1] - line[c, segment])
-            bend = bend_left * second[c, segment] + bend_right * second[c, segment + 1]
-            out[c, k] = chord + bend
+            departure = weight_left * second[c, segment] + weight_right * second[c, segment + 1]
+            out[c, k] = chord + departure
 
 
 @kernel

@@ -55,7 +55,7 @@ UNORDERED = {
 
 
 def is_file_name(word: str) -> bool:
-    """Is this meant for a file, rather than a domain's name?"""
+    """Whether this is meant for a file, rather than a domain's name."""
     return Path(word).suffix.lower() in ENDINGS or Path(word).exists() or "/" in word
 
 

@@ -43,7 +43,7 @@ _forked = SimpleNamespace(from_threads=False)
 
 
 def can_use_threads() -> bool:
-    """Can kernels with `parallel=True` be called in this process?
+    """Whether kernels with `parallel=True` can be called in this process.
 
     Not in one that was forked from a process in which some have run: the threads are not there any
     more, GNU OpenMP cannot start others, and numba then leaves out the loop and sends SIGTERM.  Who

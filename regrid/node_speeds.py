@@ -32,14 +32,14 @@ KEPT_AREA_FRACTION = 0.98
 
 
 @kernel
-def find_fast_rows(old, new, interpolated, most, first, last):
+def find_fast_rows(old, new, interpolated, most_spacings, first, last):
     """Find whole rows of nodes with a node that `fill_limited` may limit; returns their number.
 
     `first`, `last` (ni + 1) receive the inner nodes of such a row, ni > first > last elsewhere.
     The comparison is that of `fill_limited` without divisions, slightly stricter.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
-    part = (1.0 - ROUND_OFF_AREA) * most * most
+    limit_factor = (1.0 - ROUND_OFF_AREA) * most_spacings * most_spacings
     rows = 0
     for i in range(ni + 1):
         first[i] = nj
@@ -52,12 +52,12 @@ def find_fast_rows(old, new, interpolated, most, first, last):
         x1, y1 = old[0, i + 1], old[1, i + 1]
         new_x = new[0, i]
         new_y = new[1, i]
-        way_x = interpolated[0, i]
-        way_y = interpolated[1, i]
-        fast = 0
+        motion_x = interpolated[0, i]
+        motion_y = interpolated[1, i]
+        fast_count = 0
         for j in range(1, nj):
             # motion of the node beside the interpolated one
-            excess_x, excess_y = (new_x[j] - x[j]) - way_x[j], (new_y[j] - y[j]) - way_y[j]
+            excess_x, excess_y = (new_x[j] - x[j]) - motion_x[j], (new_y[j] - y[j]) - motion_y[j]
             square = excess_x * excess_x + excess_y * excess_y
             # edges of the four old triangles at the node, their squares and areas
             ax = x1[j] - x[j]
@@ -76,14 +76,14 @@ def find_fast_rows(old, new, interpolated, most, first, last):
             q = bx * cy - by * cx
             r = cx * dy - cy * dx
             s = dx * ay - dy * ax
-            # farther than `most` heights of any of them (R8.2)?
-            beyond = square * (a if a > b else b) > part * (p * p)
-            beyond |= square * (b if b > c else c) > part * (q * q)
-            beyond |= square * (c if c > d else d) > part * (r * r)
-            beyond |= square * (d if d > a else a) > part * (s * s)
-            fast += 1 if beyond else 0
+            # farther than `most_spacings` heights of any of them (R8.2)?
+            is_fast = square * (a if a > b else b) > limit_factor * (p * p)
+            is_fast |= square * (b if b > c else c) > limit_factor * (q * q)
+            is_fast |= square * (c if c > d else d) > limit_factor * (r * r)
+            is_fast |= square * (d if d > a else a) > limit_factor * (s * s)
+            fast_count += 1 if is_fast else 0
         # then all inner nodes of the row are looked at again
-        if fast > 0:
+        if fast_count > 0:
             first[i] = 1
             last[i] = nj - 1
             rows += 1
@@ -91,27 +91,28 @@ def find_fast_rows(old, new, interpolated, most, first, last):
 
 
 @inlined
-def measure_spacing(area, along, a, b, wide):
+def measure_spacing(area, dot, a, b, spares_flat):
     """Square of a corner's height over its longer edge; a, b: squares of the edges.
 
-    area, along: cross and scalar product of the edges.  wide: of an almost straight corner the
-    shorter edge, since a cell with a flat corner need not be thin.
+    area, dot: cross and scalar product of the edges.  If it `spares_flat` corners, that of the
+    shorter edge where a corner is almost straight: such a cell need not be thin.
     """
-    if wide and along < 0.0 and area * area < FLAT_CORNER_SINE * FLAT_CORNER_SINE * a * b:
+    is_flat = area * area < FLAT_CORNER_SINE * FLAT_CORNER_SINE * a * b
+    if spares_flat and dot < 0.0 and is_flat:
         return min(a, b)
     return area * area / max(a, b)
 
 
 @kernel
-def fill_limited(old, new, interpolated, most, first, last, wide, out):
-    """Nodes of `new`, each at most `most` local spacings from its interpolated position.
+def fill_limited(old, new, interpolated, most_spacings, first, last, spares_flat, out):
+    """Nodes of `new`, each at most `most_spacings` local spacings from its interpolated position.
 
     old, new, interpolated (displacements), out: (2, ni + 1, nj + 1), in m.  The local spacing is
     the least height of the four old corner triangles at the node over their longer edges: in a
     sheared sliver this is the thickness, whereas the shortest edge would allow a node to cross many
-    cells. wide: see `measure_spacing`.  Only nodes from `first` to `last` (ni + 1) of a row are
-    examined, and both are narrowed to the limited nodes.  Returns the number of these.  Theory
-    R8.2.
+    cells. `spares_flat`: see `measure_spacing`.  Only nodes from `first` to `last` (ni + 1) of a
+    row are examined, and both are narrowed to the limited nodes.  Returns the number of these.
+    Theory R8.2.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     x, y = old[0], old[1]
@@ -136,16 +137,25 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
             b = bx * bx + by * by
             c = cx * cx + cy * cy
             d = dx * dx + dy * dy
-            limit = measure_spacing(ax * by - ay * bx, ax * bx + ay * by, a, b, wide)
-            limit = min(limit, measure_spacing(bx * cy - by * cx, bx * cx + by * cy, b, c, wide))
-            limit = min(limit, measure_spacing(cx * dy - cy * dx, cx * dx + cy * dy, c, d, wide))
-            limit = min(limit, measure_spacing(dx * ay - dy * ax, dx * ax + dy * ay, d, a, wide))
-            limit *= most * most
+            limit = measure_spacing(ax * by - ay * bx, ax * bx + ay * by, a, b, spares_flat)
+            limit = min(
+                limit,
+                measure_spacing(bx * cy - by * cx, bx * cx + by * cy, b, c, spares_flat),
+            )
+            limit = min(
+                limit,
+                measure_spacing(cx * dy - cy * dx, cx * dx + cy * dy, c, d, spares_flat),
+            )
+            limit = min(
+                limit,
+                measure_spacing(dx * ay - dy * ax, dx * ax + dy * ay, d, a, spares_flat),
+            )
+            limit *= most_spacings * most_spacings
             # taken back to the limit
             if square > limit:
-                keep = (limit / square) ** 0.5
-                out[0, i, j] = x[i, j] + interpolated[0, i, j] + keep * excess_x
-                out[1, i, j] = y[i, j] + interpolated[1, i, j] + keep * excess_y
+                fraction = (limit / square) ** 0.5
+                out[0, i, j] = x[i, j] + interpolated[0, i, j] + fraction * excess_x
+                out[1, i, j] = y[i, j] + interpolated[1, i, j] + fraction * excess_y
                 limited += 1
                 first[i] = min(first[i], j)
                 last[i] = j
@@ -153,82 +163,82 @@ def fill_limited(old, new, interpolated, most, first, last, wide, out):
 
 
 @inlined
-def mark_cell(loose, i, j):
+def mark_cell(marks, i, j):
     """Mark the four nodes of a cell."""
-    loose[i, j] = loose[i + 1, j] = loose[i, j + 1] = loose[i + 1, j + 1] = 1
+    marks[i, j] = marks[i + 1, j] = marks[i, j + 1] = marks[i + 1, j + 1] = 1
 
 
 @inlined
-def move_marked(limited, new, first, last, loose, part):
+def move_marked(limited, new, first, last, marks, fraction):
     """Move marked nodes by a fraction of the distance from `limited` to `new`."""
     for i in range(1, limited.shape[1] - 1):
         for j in range(first[i], last[i] + 1):
-            if loose[i, j] > 0:
+            if marks[i, j] > 0:
                 for k in range(2):
-                    limited[k, i, j] += part * (new[k, i, j] - limited[k, i, j])
+                    limited[k, i, j] += fraction * (new[k, i, j] - limited[k, i, j])
 
 
 @kernel
-def relax_sharpened(old, new, limited, first, last, loose):
+def relax_sharpened(old, new, limited, first, last, marks):
     """Move nodes of cells that the limit sharpens halfway from `limited` to `new`.
 
     These cells have a corner triangle of less area in `limited` than KEPT of that in either other
     grid, all (2, ni + 1, nj + 1), except the block's own corners, which no inner node changes.
     Only nodes from `first` to `last` of a row may differ from `new`, which is convex: no other
-    cells are examined.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
+    cells are examined.  `marks` (ni + 1, nj + 1) is scratch.  Returns the number of such cells.
     """
     ni, nj = old.shape[1] - 1, old.shape[2] - 1
     count = 0
-    loose[:] = 0
+    marks[:] = 0
     for i in range(ni):
         for j in range(min(first[i], first[i + 1]) - 1, min(max(last[i], last[i + 1]) + 1, nj)):
-            sharpened = False
+            is_sharpened = False
             for corner in range(4):
                 p, q, _, _ = find_triangle(i, j, corner)
                 if (p == 0 or p == ni) and (q == 0 or q == nj):
                     continue
-                before = compute_doubled_area(old, i, j, corner)
-                after = compute_doubled_area(new, i, j, corner)
-                area = compute_doubled_area(limited, i, j, corner)
-                sharpened |= not (area >= KEPT_AREA_FRACTION * min(before, after))
-            if sharpened:
+                old_area = compute_doubled_area(old, i, j, corner)
+                new_area = compute_doubled_area(new, i, j, corner)
+                limited_area = compute_doubled_area(limited, i, j, corner)
+                is_sharpened |= not (limited_area >= KEPT_AREA_FRACTION * min(old_area, new_area))
+            if is_sharpened:
                 count += 1
-                mark_cell(loose, i, j)
-    move_marked(limited, new, first, last, loose, 0.5)
+                mark_cell(marks, i, j)
+    move_marked(limited, new, first, last, marks, 0.5)
     return count
 
 
 @kernel
-def release_folded(new, limited, first, last, whole, loose):
+def release_folded(new, limited, first, last, all_the_way, marks):
     """Move nodes of cells that the limit folds halfway from `limited` to `new`.
 
     A corner is folded if it is not positive beyond round-off, except the block's own corners, which
     no inner node changes.  Only nodes from `first` to `last` (ni + 1) of a row may differ from
-    `new`.  whole: all the way.  `loose` (ni + 1, nj + 1) is scratch.  Returns the number of such
-    cells.
+    `new`.  They may move `all_the_way` at once.  `marks` (ni + 1, nj + 1) is scratch.  Returns the
+    number of such cells.
     """
     ni, nj = new.shape[1] - 1, new.shape[2] - 1
     x, y = limited[0], limited[1]
-    part = 1.0 if whole else 0.5
+    fraction = 1.0 if all_the_way else 0.5
     count = 0
-    loose[:] = 0
+    marks[:] = 0
     for i in range(ni):
         for j in range(min(first[i], first[i + 1]) - 1, min(max(last[i], last[i + 1]) + 1, nj)):
-            folded = False
+            is_folded = False
             for corner in range(4):
-                p, q, far_i, far_j = find_triangle(i, j, corner)
+                p, q, next_p, next_q = find_triangle(i, j, corner)
                 if (p == 0 or p == ni) and (q == 0 or q == nj):
                     continue
-                ax, ay = x[far_i, q] - x[p, q], y[far_i, q] - y[p, q]
-                bx, by = x[p, far_j] - x[p, q], y[p, far_j] - y[p, q]
+                ax, ay = x[next_p, q] - x[p, q], y[next_p, q] - y[p, q]
+                bx, by = x[p, next_q] - x[p, q], y[p, next_q] - y[p, q]
                 squares = (ax * ax + ay * ay) + (bx * bx + by * by)
-                folded |= not (
+                is_folded |= not (
                     compute_doubled_area(limited, i, j, corner) > ROUND_OFF_AREA * squares
                 )
-            if folded:
+            if is_folded:
                 count += 1
-                mark_cell(loose, i, j)
-    move_marked(limited, new, first, last, loose, part)
+                mark_cell(marks, i, j)
+    move_marked(limited, new, first, last, marks, fraction)
     return count
 
 
@@ -249,14 +259,19 @@ class MotionLimiter:
 
     def __init__(self, shape: tuple[int, ...]):
         self.shape = shape
-        self.loose = np.empty(shape[1:], dtype=np.int8)
-        # the limited nodes of each row; those of `far` are a subset
+        self.marks = np.empty(shape[1:], dtype=np.int8)
+        # the limited nodes of each row; those of `loosened` are a subset
         self.first, self.last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
-        self.far_first, self.far_last = (np.empty(shape[1], dtype=np.int64) for _ in range(2))
+        self.loosened_first, self.loosened_last = (
+            np.empty(shape[1], dtype=np.int64) for _ in range(2)
+        )
 
-    def limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
-        """`new` with inner nodes within `most` spacings of the interpolated grid, and how many were
-        limited.
+    def limit(
+        self, old: np.ndarray, new: np.ndarray, most_spacings: float
+    ) -> tuple[np.ndarray, int]:
+        """`new` with inner nodes near the interpolated grid, and how many were limited.
+
+        They are within `most_spacings` local spacings of it.
 
         `new` must be convex; the result is valid until the next regrid of this thread.
 
@@ -265,55 +280,64 @@ class MotionLimiter:
         all nodes return by the same fraction to `new`, the least of halvings that leaves no fold.
         A symmetric block stays so.
         """
-        limited, count = self._limit(old, new, most)
+        limited, count = self._limit(old, new, most_spacings)
         symmetry = find_symmetry(old, new) if count > 0 else None
         if symmetry is not None:
-            back = limited - new
-            if symmetry.even_out(back):
-                even = new + back
-                if len(find_bad_cells(even)) == 0:
-                    limited = even
+            correction = limited - new
+            if symmetry.even_out(correction):
+                evened = new + correction
+                if len(find_bad_cells(evened)) == 0:
+                    limited = evened
         return limited, count
 
-    def _limit(self, old: np.ndarray, new: np.ndarray, most: float) -> tuple[np.ndarray, int]:
+    def _limit(
+        self, old: np.ndarray, new: np.ndarray, most_spacings: float
+    ) -> tuple[np.ndarray, int]:
         """`limit` without regard to symmetry."""
         # nodes that the limit of theory R8.2 holds
         first = self.first
         last = self.last
-        whole = share_memory(3 * new.size)[: 3 * new.size]
-        interpolated, held, far = whole.reshape(3, *self.shape)
+        memory = share_memory(3 * new.size)[: 3 * new.size]
+        interpolated, limited, loosened = memory.reshape(3, *self.shape)
         fill_displacement(old, new, interpolated)
-        if find_fast_rows(old, new, interpolated, most, first, last) == 0:
+        if find_fast_rows(old, new, interpolated, most_spacings, first, last) == 0:
             return new, 0
-        count = fill_limited(old, new, interpolated, most, first, last, False, held)
+        count = fill_limited(old, new, interpolated, most_spacings, first, last, False, limited)
         if count == 0:
             return new, 0
         # those that it sharpens may go to the looser limit, by halves
-        self.far_first[:] = first
-        self.far_last[:] = last
-        far_first = self.far_first
-        far_last = self.far_last
+        self.loosened_first[:] = first
+        self.loosened_last[:] = last
+        loosened_first = self.loosened_first
+        loosened_last = self.loosened_last
         fill_limited(
-            old, new, interpolated, LOOSENED_LIMIT_FACTOR * most, far_first, far_last, True, far
+            old,
+            new,
+            interpolated,
+            LOOSENED_LIMIT_FACTOR * most_spacings,
+            loosened_first,
+            loosened_last,
+            True,
+            loosened,
         )
         for _ in range(MOST_CELL_HALVINGS):
-            if relax_sharpened(old, far, held, first, last, self.loose) == 0:
+            if relax_sharpened(old, loosened, limited, first, last, self.marks) == 0:
                 break
         # folded ones go back to `new`
         for halvings in range(MOST_RETURN_ROUNDS):
-            whole = halvings >= MOST_CELL_HALVINGS
-            if release_folded(new, held, first, last, whole, self.loose) == 0:
-                return held, count
-        if len(find_bad_cells(held)) == 0:
-            return held, count
-        find_fast_rows(old, new, interpolated, most, first, last)
-        fill_limited(old, new, interpolated, most, first, last, False, held)
+            all_the_way = halvings >= MOST_CELL_HALVINGS
+            if release_folded(new, limited, first, last, all_the_way, self.marks) == 0:
+                return limited, count
+        if len(find_bad_cells(limited)) == 0:
+            return limited, count
+        find_fast_rows(old, new, interpolated, most_spacings, first, last)
+        fill_limited(old, new, interpolated, most_spacings, first, last, False, limited)
         for halvings in range(MOST_BLENDS, 0, -1):
-            np.subtract(new, held, out=far)
-            far *= 0.5**halvings
-            far += held
-            if len(find_bad_cells(far)) == 0:
-                return far, count
+            np.subtract(new, limited, out=loosened)
+            loosened *= 0.5**halvings
+            loosened += limited
+            if len(find_bad_cells(loosened)) == 0:
+                return loosened, count
         return new, 0
 
 
@@ -354,21 +378,21 @@ def limit_node_speeds(old: np.ndarray, new: np.ndarray, factor: float) -> np.nda
     fill_displacement(np.ascontiguousarray(old), np.ascontiguousarray(new), interpolated)
     extra = (new - old) - interpolated
     limit = factor * measure_node_speeds(old, new).boundary
-    too_fast = np.hypot(*(new - old)) > limit
-    too_fast[[0, -1]] = too_fast[:, [0, -1]] = False
-    if not too_fast.any():
+    is_too_fast = np.hypot(*(new - old)) > limit
+    is_too_fast[[0, -1]] = is_too_fast[:, [0, -1]] = False
+    if not is_too_fast.any():
         return new
     # Largest theta in 0..1 with |interpolated + theta extra| <= limit; 0 where interpolated alone
     # is beyond it.
     square = (extra**2).sum(axis=0)
-    slope = (extra * interpolated).sum(axis=0)
-    room = np.maximum(limit**2 - (interpolated**2).sum(axis=0), 0.0)
+    dot = (extra * interpolated).sum(axis=0)
+    remaining_square = np.maximum(limit**2 - (interpolated**2).sum(axis=0), 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        theta = (-slope + np.sqrt(slope**2 + square * room)) / square
-    held = np.where(too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)
+        theta = (-dot + np.sqrt(dot**2 + square * remaining_square)) / square
+    taken_back = np.where(is_too_fast & (square > 0.0), 1.0 - np.clip(theta, 0.0, 1.0), 0.0)
     for _ in range(MOST_CELL_HALVINGS):
-        limited = new - held * extra
+        limited = new - taken_back * extra
         if len(find_bad_cells(limited)) == 0:
             return limited
-        held *= 0.5
+        taken_back *= 0.5
     return new

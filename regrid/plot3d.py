@@ -244,7 +244,7 @@ def _read_numbers(parts: list[bytes], sizes, order: str, words: str, only=None):
 
 
 def _is_plausible(blocks: list[np.ndarray]) -> bool:
-    """Are all coordinates usual numbers?  Bytes that are something else look like 1e-310."""
+    """Whether all coordinates are usual numbers; bytes of anything else look like 1e-310."""
     for nodes in blocks:
         size = np.abs(nodes)
         if not np.isfinite(size).all() or (size > 1e100).any():

@@ -82,7 +82,7 @@ class CostAwareRegridder(Regridder, Protocol):
 
     @property
     def sees_cost(self) -> bool:
-        """Does it want the sound speeds?"""
+        """Whether it wants the sound speeds."""
         ...
 
     def regrid(
@@ -103,12 +103,12 @@ class FlowAwareRegridder(Regridder, Protocol):
 
     @property
     def sees_flow(self) -> bool:
-        """Is `take_step` to be called before every step?"""
+        """Whether `take_step` is to be called before every step."""
         ...
 
     @property
     def owns_sides(self) -> bool:
-        """Does it place the nodes of its `free_sides` itself?"""
+        """Whether it places the nodes of its `free_sides` itself."""
         ...
 
     def take_step(self, fields: Mapping[str, np.ndarray], step_fraction: float) -> None:
@@ -118,7 +118,7 @@ class FlowAwareRegridder(Regridder, Protocol):
 
 
 def sees_cost(regridder: Regridder) -> bool:
-    """Is the regridder to be given the cells' sound speeds?"""
+    """Whether the regridder takes the cells' sound speeds."""
     return isinstance(regridder, CostAwareRegridder) and regridder.sees_cost
 
 

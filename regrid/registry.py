@@ -98,5 +98,5 @@ def find_options(maker: Any) -> dict[str, str]:
 
 
 def takes_weight(name: str) -> bool:
-    """Has this regridder an option called weight?"""
+    """Whether this regridder has an option called weight."""
     return "weight" in inspect.signature(load_regridder(name)).parameters

@@ -416,8 +416,8 @@ def prepare(old, inputs, motion, conditional, rate_limits, check):
         rate = max(rate, least_rate)
         cost_scale = 2.0 / (rate * rate) if rate > 0.0 else 0.0
     # do the sides meet?
-    line, boxes, ways, ends, stack = check
-    meeting, _ = search_meeting(sides, line, boxes, ways, ends, stack)
+    line, boxes, half_planes, ends, stack = check
+    meeting, _ = search_meeting(sides, line, boxes, half_planes, ends, stack)
     turned_corners = count_turned_corners(sides)
     area = compute_area(sides)
     return SideNumbers(area, turned_corners, meeting, sigma, area_target, cost_scale)

@@ -88,7 +88,7 @@ def is_of_packages(module: str) -> bool:
 
 
 def _has_names(value) -> bool:
-    """Is it a function, module or class, and none of the toolchain's?"""
+    """Whether it is a function, module or class, and none of the toolchain's."""
     if not isinstance(value, FunctionType | ModuleType | type):
         return False
     where = value.__name__ if isinstance(value, ModuleType) else str(value.__module__)

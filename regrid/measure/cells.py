@@ -54,7 +54,7 @@ def _compute_excess(nodes, i, j, side, x, y):
 
 @compiled_once
 def _is_in_cell(nodes, i, j, sign, x, y):
-    """Is a point in a cell or on its edge?"""
+    """Whether a point is in a cell or on its edge."""
     for side in range(4):
         if sign * _compute_excess(nodes, i, j, side, x, y) > ON_EDGE:
             return False
@@ -63,7 +63,7 @@ def _is_in_cell(nodes, i, j, sign, x, y):
 
 @compiled_once
 def _crosses(xa, ya, xb, yb, x, y):
-    """Does the ray from a point towards larger x cross the segment a-b?"""
+    """Whether the ray from a point towards larger x crosses the segment a-b."""
     if (ya > y) == (yb > y):
         return False
     return x < xa + (y - ya) / (yb - ya) * (xb - xa)
@@ -71,7 +71,7 @@ def _crosses(xa, ya, xb, yb, x, y):
 
 @compiled_once
 def _is_in_outline(nodes, x, y):
-    """Is a point inside of the polygon of the block's sides?"""
+    """Whether a point is inside the polygon of the block's sides."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     inside = False
     u, v = nodes[0], nodes[1]
@@ -92,28 +92,28 @@ def _walk(nodes, i, j, sign, x, y):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for _ in range(4 * (ni + nj) + 16):
         # the side that the point is farthest beyond, but none of the block's
-        worst = 0.0
-        chosen = -1
-        beyond = False
+        largest_excess = 0.0
+        next_side = -1
+        is_beyond = False
         for side in range(4):
             excess = sign * _compute_excess(nodes, i, j, side, x, y)
             if excess > ON_EDGE:
-                beyond = True
+                is_beyond = True
                 ends = (i == 0, i == ni - 1, j == 0, j == nj - 1)
-                if not ends[side] and excess > worst:
-                    worst = excess
-                    chosen = side
+                if not ends[side] and excess > largest_excess:
+                    largest_excess = excess
+                    next_side = side
         # arrived, or stuck at the block's side
-        if not beyond:
+        if not is_beyond:
             return i, j, True
-        if chosen < 0:
+        if next_side < 0:
             return i, j, False
         # on to the next cell
-        if chosen == 0:
+        if next_side == 0:
             i -= 1
-        elif chosen == 1:
+        elif next_side == 1:
             i += 1
-        elif chosen == 2:
+        elif next_side == 2:
             j -= 1
         else:
             j += 1
@@ -162,15 +162,15 @@ def _solve_quad(nodes, a, b, x, y):
     xst, yst = (x11 - x01) - xs, (y11 - y01) - ys
     scale = abs(xs) + abs(ys) + abs(xt) + abs(yt)
     s = t = 0.5
-    best = -1.0
+    least_residual = -1.0
     best_s = best_t = 0.5
     # Newton's method for its inverse; the best place is kept
     for _ in range(MOST_ITERATIONS):
         rx = x - x00 - s * xs - t * xt - s * t * xst
         ry = y - y00 - s * ys - t * yt - s * t * yst
         size = abs(rx) + abs(ry)
-        if best < 0.0 or size < best:
-            best = size
+        if least_residual < 0.0 or size < least_residual:
+            least_residual = size
             best_s = s
             best_t = t
         elif size <= 1e3 * CONVERGED_DISTANCE * scale:
@@ -184,42 +184,42 @@ def _solve_quad(nodes, a, b, x, y):
         t += (ds_x * ry - rx * ds_y) / determinant
         if not (abs(s) < 1e3 and abs(t) < 1e3):
             break
-    return best_s, best_t, best <= 1e3 * CONVERGED_DISTANCE * scale
+    return best_s, best_t, least_residual <= 1e3 * CONVERGED_DISTANCE * scale
 
 
 @compiled_once
-def _place(nodes, i, j, x, y):
+def _find_quad(nodes, i, j, x, y):
     """Quad (a, b) of centres around a point near cell (i, j), parts s, t in it, and success."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    most_a = max(ni - 2, 0)
-    most_b = max(nj - 2, 0)
+    last_a = max(ni - 2, 0)
+    last_b = max(nj - 2, 0)
     # the first quad near the cell
-    a = min(i, most_a)
-    b = min(j, most_b)
+    a = min(i, last_a)
+    b = min(j, last_b)
     s = t = 0.0
     # from quad to quad until s and t lie within one
     for _ in range(MOST_QUADS):
-        s, t, found = _solve_quad(nodes, a, b, x, y)
-        if not found:
+        s, t, converged = _solve_quad(nodes, a, b, x, y)
+        if not converged:
             break
         next_a = a
         next_b = b
         if s < -UNIT_PARTS:
             next_a = max(a - 1, 0)
         elif s > 1.0 + UNIT_PARTS:
-            next_a = min(a + 1, most_a)
+            next_a = min(a + 1, last_a)
         if t < -UNIT_PARTS:
             next_b = max(b - 1, 0)
         elif t > 1.0 + UNIT_PARTS:
-            next_b = min(b + 1, most_b)
+            next_b = min(b + 1, last_b)
         if next_a == a and next_b == b:
             if abs(a + s - i) <= 2.0 and abs(b + t - j) <= 2.0:
                 return a, b, s, t, True
             break
         a = next_a
         b = next_b
-    a = min(i, most_a)
-    b = min(j, most_b)
+    a = min(i, last_a)
+    b = min(j, last_b)
     return a, b, float(i - a), float(j - b), False
 
 
@@ -242,26 +242,26 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
             continue
         # the cell with the point: by a walk, else one after another
         i, j = min(max(cells[0, k], 0), ni - 1), min(max(cells[1, k], 0), nj - 1)
-        i, j, inside = _walk(nodes, i, j, sign, x, y)
-        if not inside and _is_in_outline(nodes, x, y):
-            for m in range(ni * nj):
-                if _is_in_cell(nodes, m // nj, m % nj, sign, x, y):
-                    i = m // nj
-                    j = m % nj
-                    inside = True
+        i, j, is_inside = _walk(nodes, i, j, sign, x, y)
+        if not is_inside and _is_in_outline(nodes, x, y):
+            for cell in range(ni * nj):
+                if _is_in_cell(nodes, cell // nj, cell % nj, sign, x, y):
+                    i = cell // nj
+                    j = cell % nj
+                    is_inside = True
                     break
-        if not inside and reach <= 0.0:
+        if not is_inside and reach <= 0.0:
             continue
         # the quad of centres around it
-        a, b, s, t, placed = _place(nodes, i, j, x, y)
+        a, b, s, t, has_place = _find_quad(nodes, i, j, x, y)
         # beside the block, within reach?
-        if not inside:
+        if not is_inside:
             low = -0.5 - reach
-            far_i = ni - 0.5 + reach
-            far_j = nj - 0.5 + reach
-            if not (placed and low <= a + s <= far_i and low <= b + t <= far_j):
+            high_i = ni - 0.5 + reach
+            high_j = nj - 0.5 + reach
+            if not (has_place and low <= a + s <= high_i and low <= b + t <= high_j):
                 continue
-        where[k] = INSIDE_BLOCK if inside else BESIDE_BLOCK
+        where[k] = INSIDE_BLOCK if is_inside else BESIDE_BLOCK
         cells[0, k] = i
         cells[1, k] = j
         quads[0, k] = a
@@ -346,32 +346,32 @@ def _fill_side_areas(x, y, curve_x, curve_y, below, whole):
             ring_x = (x[i, j], x[i + 1, j], x[i + 1, j + 1], x[i, j + 1])
             ring_y = (y[i, j], y[i + 1, j], y[i + 1, j + 1], y[i, j + 1])
             # integrals around the cell
-            area = 0.0
-            side = 0.0
-            for a in range(4):
-                b = (a + 1) % 4
-                area += 0.5 * (ring_x[a] + ring_x[b]) * (ring_y[b] - ring_y[a])
-                side += _integrate_edge(
-                    ring_x[a], ring_y[a], ring_x[b], ring_y[b], curve_x, curve_y
-                )
+            cell_area = 0.0
+            side_area = 0.0
+            for corner in range(4):
+                next_corner = (corner + 1) % 4
+                ax, ay = ring_x[corner], ring_y[corner]
+                bx, by = ring_x[next_corner], ring_y[next_corner]
+                cell_area += 0.5 * (ax + bx) * (by - ay)
+                side_area += _integrate_edge(ax, ay, bx, by, curve_x, curve_y)
             # a cell wholly on one side: exactly 0 or all of it
-            low = min(ring_x)
-            high = max(ring_x)
-            bottom = min(ring_y)
-            top = max(ring_y)
-            first = max(0, _count_below(curve_y, bottom, True) - 1)
-            last = min(curve_y.size - 1, _count_below(curve_y, top, False))
-            least = curve_x[first]
-            most = curve_x[first]
-            for k in range(first, last + 1):
-                least = min(least, curve_x[k])
-                most = max(most, curve_x[k])
-            if high <= least:
-                side = area
-            elif low >= most:
-                side = 0.0
-            below[i, j] = side
-            whole[i, j] = area
+            least_x = min(ring_x)
+            most_x = max(ring_x)
+            least_y = min(ring_y)
+            most_y = max(ring_y)
+            first_point = max(0, _count_below(curve_y, least_y, True) - 1)
+            last_point = min(curve_y.size - 1, _count_below(curve_y, most_y, False))
+            least_curve = curve_x[first_point]
+            most_curve = curve_x[first_point]
+            for k in range(first_point, last_point + 1):
+                least_curve = min(least_curve, curve_x[k])
+                most_curve = max(most_curve, curve_x[k])
+            if most_x <= least_curve:
+                side_area = cell_area
+            elif least_x >= most_curve:
+                side_area = 0.0
+            below[i, j] = side_area
+            whole[i, j] = cell_area
 
 
 def compute_area_fractions(nodes: np.ndarray, curve, along: str = "y") -> np.ndarray:

@@ -80,15 +80,15 @@ def compute_turns(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarr
         right = (a[1] - c[1]) * (b[0] - c[0])
         area = left - right
         bound = ORIENTATION_ERROR_BOUND * (np.abs(left) + np.abs(right)) + UNDERFLOW
-        sure = (np.abs(area) > bound) & np.isfinite(area)
+        is_certain = (np.abs(area) > bound) & np.isfinite(area)
         # Equal coordinates make both products exact zeros: collapsed edges, lines along x or y.
-        sure |= ((a[0] == c[0]) | (b[1] == c[1])) & ((a[1] == c[1]) | (b[0] == c[0]))
-    signs = np.where(sure, np.sign(area), 0.0).astype(np.int8)
+        is_certain |= ((a[0] == c[0]) | (b[1] == c[1])) & ((a[1] == c[1]) | (b[0] == c[0]))
+    signs = np.where(is_certain, np.sign(area), 0.0).astype(np.int8)
     finite = np.isfinite(a).all(axis=0) & np.isfinite(b).all(axis=0) & np.isfinite(c).all(axis=0)
-    doubtful = np.argwhere(~sure & finite)
+    doubtful = np.argwhere(~is_certain & finite)
     for index in doubtful:
-        at = (slice(None), *index)
-        signs[tuple(index)] = turn_exactly(a[at], b[at], c[at])
+        place = (slice(None), *index)
+        signs[tuple(index)] = turn_exactly(a[place], b[place], c[place])
     return signs, len(doubtful)
 
 
@@ -110,13 +110,13 @@ def find_folded_cells(nodes: np.ndarray, excluded: np.ndarray | None = None) -> 
 
     Without `excluded` the block's own corners are left out.
     """
-    wrong = compute_corner_signs(nodes) <= 0
+    is_folded = compute_corner_signs(nodes) <= 0
     if excluded is not None:
-        wrong &= ~excluded
+        is_folded &= ~excluded
     else:
         for corner in BLOCK_CORNERS:
-            wrong[corner] = False
-    return np.argwhere(wrong.any(axis=0))
+            is_folded[corner] = False
+    return np.argwhere(is_folded.any(axis=0))
 
 
 @kernel
@@ -140,12 +140,12 @@ def mark_triangles(nodes, areas):
             areas[k] = along_x * across_y - along_y * across_x
             if k == corner:
                 cosine = along_x * across_x + along_y * across_y
-        others = True
+        others_are_positive = True
         for k in range(4):
-            others = others and (k == corner or areas[k] > 0.0)
+            others_are_positive = others_are_positive and (k == corner or areas[k] > 0.0)
         cell = areas[corner] + areas[(corner + 2) % 4]
-        flat = -TURNED_TRIANGLE_PART * cell <= areas[corner] <= FLAT_TRIANGLE_PART * cell
-        if cosine < 0.0 and others and flat:
+        is_flat = -TURNED_TRIANGLE_PART * cell <= areas[corner] <= FLAT_TRIANGLE_PART * cell
+        if cosine < 0.0 and others_are_positive and is_flat:
             marks += 1 << corner
     return marks
 
@@ -184,10 +184,10 @@ def compute_doubled_area(nodes, i, j, corner):
 
     Positive when the cell is convex there, in a grid whose i, j turn like x, y.
     """
-    p, q, far_i, far_j = find_triangle(i, j, corner)
+    p, q, next_p, next_q = find_triangle(i, j, corner)
     x, y = nodes[0], nodes[1]
-    cross = (x[far_i, q] - x[p, q]) * (y[p, far_j] - y[p, q])
-    cross -= (y[far_i, q] - y[p, q]) * (x[p, far_j] - x[p, q])
+    cross = (x[next_p, q] - x[p, q]) * (y[p, next_q] - y[p, q])
+    cross -= (y[next_p, q] - y[p, q]) * (x[p, next_q] - x[p, q])
     return cross if (p == i) == (q == j) else -cross
 
 
@@ -224,15 +224,17 @@ def find_excluded_corners(nodes: np.ndarray) -> np.ndarray:
     fixed = np.zeros((ni + 1, nj + 1), dtype=bool)
     fixed[[0, -1]] = fixed[:, [0, -1]] = True
     for corner, triangle in enumerate(TRIANGLES):
-        at = [(slice(i, i + ni), slice(j, j + nj)) for i, j in triangle]
+        slices = [(slice(i, i + ni), slice(j, j + nj)) for i, j in triangle]
         for p, q in ((0, 1), (0, 2), (1, 2)):
-            same = (nodes[(slice(None), *at[p])] == nodes[(slice(None), *at[q])]).all(axis=0)
-            excluded[corner] |= same & fixed[at[p]] & fixed[at[q]]
+            coincide = (nodes[(slice(None), *slices[p])] == nodes[(slice(None), *slices[q])]).all(
+                axis=0
+            )
+            excluded[corner] |= coincide & fixed[slices[p]] & fixed[slices[q]]
     return excluded
 
 
 def is_collapsed(excluded: np.ndarray) -> bool:
-    """Are there excluded corners other than the block's own?"""
+    """Whether corners other than the block's own are excluded."""
     return bool(excluded.any()) and int(excluded.sum()) > sum(
         bool(excluded[corner]) for corner in BLOCK_CORNERS
     )

@@ -1,4 +1,4 @@
-"""Does the boundary of a block, or a polyline, cross or touch itself or another one?
+"""Whether the boundary of a block, or a polyline, crosses or touches itself or another one.
 
 A grid whose cells are all convex covers no point twice if and only if its boundary does not cross
 itself (theory R5.3): convex cells alone allow two lobes of one grid to lie on each other.  The
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.jit import inlined, kernel
 from shockgrid.regrid.measure.corners import ORIENTATION_ERROR_BOUND, UNDERFLOW, compute_turns
 from shockgrid.regrid.measure.cuts import Cuts, find_cut_edges, join_cuts
 from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, find_node, get_side
@@ -26,6 +26,7 @@ LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
 NO_CROSSING = -1
 COINCIDENT_EDGES = -2
+# half planes that a piece's edges may run into
 GOES_RIGHT = 1
 GOES_LEFT = 2
 GOES_UP = 4
@@ -58,34 +59,48 @@ def find_turn(a_x, a_y, b_x, b_y, c_x, c_y):
     return (1 if area > bound else 0) - (1 if area < -bound else 0)
 
 
+@inlined
+def are_apart(low_a, high_a, low_b, high_b):
+    """Whether two intervals have no point in common."""
+    return high_a < low_b or high_b < low_a
+
+
 @kernel
 def may_meet(line, a, b, count, closed):
-    """May the edges a < b of the polygon have a point in common that is not a node of both?"""
-    x, y = line[0], line[1]
-    p = a
-    q = a + 1
-    r = b
-    s = b + 1
-    if max(x[p], x[q]) < min(x[r], x[s]) or max(x[r], x[s]) < min(x[p], x[q]):
+    """Whether the edges a < b of the polygon may have a point in common that is no node of both."""
+    # the edges p-q and r-s, by their boxes
+    px, py = line[0, a], line[1, a]
+    qx, qy = line[0, a + 1], line[1, a + 1]
+    rx, ry = line[0, b], line[1, b]
+    sx, sy = line[0, b + 1], line[1, b + 1]
+    if are_apart(min(px, qx), max(px, qx), min(rx, sx), max(rx, sx)):
         return False
-    if max(y[p], y[q]) < min(y[r], y[s]) or max(y[r], y[s]) < min(y[p], y[q]):
+    if are_apart(min(py, qy), max(py, qy), min(ry, sy), max(ry, sy)):
         return False
-    following = b == a + 1 or (closed and x[q] == x[r] and y[q] == y[r])
-    leading = (a == 0 and b == count - 1) or (closed and x[s] == x[p] and y[s] == y[p])
-    if following or leading:
-        # From the common node: do both edges go the same way?
-        m, k, n = (q, p, s) if following else (p, q, r)
-        along = (x[k] - x[m]) * (x[n] - x[m]) + (y[k] - y[m]) * (y[n] - y[m])
-        return along > 0.0 and find_turn(x[k], y[k], x[n], y[n], x[m], y[m]) == 0
-    first = find_turn(x[p], y[p], x[q], y[q], x[r], y[r])
-    if first * find_turn(x[p], y[p], x[q], y[q], x[s], y[s]) > 0:
+    # neighbours meet if, from their common node, both go the same way
+    b_follows = b == a + 1 or (closed and qx == rx and qy == ry)
+    b_leads = (a == 0 and b == count - 1) or (closed and sx == px and sy == py)
+    if b_follows:
+        along = (px - qx) * (sx - qx) + (py - qy) * (sy - qy)
+        return along > 0.0 and find_turn(px, py, sx, sy, qx, qy) == 0
+    if b_leads:
+        along = (qx - px) * (rx - px) + (qy - py) * (ry - py)
+        return along > 0.0 and find_turn(qx, qy, rx, ry, px, py) == 0
+    # others if each has the ends of the other on both sides
+    if find_turn(px, py, qx, qy, rx, ry) * find_turn(px, py, qx, qy, sx, sy) > 0:
         return False
-    second = find_turn(x[r], y[r], x[s], y[s], x[p], y[p])
-    return second * find_turn(x[r], y[r], x[s], y[s], x[q], y[q]) <= 0
+    return find_turn(rx, ry, sx, sy, px, py) * find_turn(rx, ry, sx, sy, qx, qy) <= 0
+
+
+@inlined
+def find_half_planes(start_x, start_y, end_x, end_y):
+    """The half planes into which an edge runs, as a sum of GOES_RIGHT to GOES_DOWN."""
+    along_x = (GOES_RIGHT if end_x > start_x else 0) | (GOES_LEFT if end_x < start_x else 0)
+    return along_x | (GOES_UP if end_y > start_y else 0) | (GOES_DOWN if end_y < start_y else 0)
 
 
 @kernel
-def fill_tree(line, leaves, boxes, ways, ends):
+def fill_tree(line, leaves, boxes, half_planes, ends):
     """Boxes (4, 2 leaves), half planes (2 leaves) and first, last edges (2, 2 leaves) of pieces.
 
     Piece k has the parts 2k and 2k+1; leaves are the last `leaves`.  Returns the first edge without
@@ -93,50 +108,48 @@ def fill_tree(line, leaves, boxes, ways, ends):
     """
     x, y = line[0], line[1]
     count = line.shape[1] - 1
-    short = -1
+    first_point = -1
     # leaves: a few edges each
     for leaf in range(leaves):
         first = min(count, leaf * LEAF_EDGES)
         last = min(count, (leaf + 1) * LEAF_EDGES)
-        low_x = np.inf
-        low_y = np.inf
-        high_x = -np.inf
-        high_y = -np.inf
-        # box, and half planes into which all of its edges go
-        way = 15
+        low_x, low_y = np.inf, np.inf
+        high_x, high_y = -np.inf, -np.inf
+        # box, and half planes into which all of its edges run
+        common = GOES_RIGHT | GOES_LEFT | GOES_UP | GOES_DOWN
         for k in range(first, last):
             low_x, high_x = min(low_x, x[k], x[k + 1]), max(high_x, x[k], x[k + 1])
             low_y, high_y = min(low_y, y[k], y[k + 1]), max(high_y, y[k], y[k + 1])
-            here = (GOES_RIGHT if x[k + 1] > x[k] else 0) | (GOES_LEFT if x[k + 1] < x[k] else 0)
-            here |= (GOES_UP if y[k + 1] > y[k] else 0) | (GOES_DOWN if y[k + 1] < y[k] else 0)
-            way &= here
-            if here == 0 and short < 0:
-                short = k
+            edge_half_planes = find_half_planes(x[k], y[k], x[k + 1], y[k + 1])
+            common &= edge_half_planes
+            if edge_half_planes == 0 and first_point < 0:
+                first_point = k
         # kept as a leaf
-        at = leaves + leaf
-        boxes[LOW_X, at] = low_x
-        boxes[HIGH_X, at] = high_x
-        boxes[LOW_Y, at] = low_y
-        boxes[HIGH_Y, at] = high_y
-        ways[at] = way
-        ends[0, at] = first
-        ends[1, at] = last
+        piece = leaves + leaf
+        boxes[LOW_X, piece] = low_x
+        boxes[HIGH_X, piece] = high_x
+        boxes[LOW_Y, piece] = low_y
+        boxes[HIGH_Y, piece] = high_y
+        half_planes[piece] = common
+        ends[0, piece] = first
+        ends[1, piece] = last
     # larger pieces from their two parts
-    for at in range(leaves - 1, 0, -1):
-        one = 2 * at
-        two = 2 * at + 1
-        boxes[LOW_X, at] = min(boxes[LOW_X, one], boxes[LOW_X, two])
-        boxes[HIGH_X, at] = max(boxes[HIGH_X, one], boxes[HIGH_X, two])
-        boxes[LOW_Y, at] = min(boxes[LOW_Y, one], boxes[LOW_Y, two])
-        boxes[HIGH_Y, at] = max(boxes[HIGH_Y, one], boxes[HIGH_Y, two])
-        ways[at] = ways[one] & ways[two]
-        ends[0, at], ends[1, at] = ends[0, one], ends[1, two]
-    return short
+    for piece in range(leaves - 1, 0, -1):
+        first = 2 * piece
+        second = 2 * piece + 1
+        boxes[LOW_X, piece] = min(boxes[LOW_X, first], boxes[LOW_X, second])
+        boxes[HIGH_X, piece] = max(boxes[HIGH_X, first], boxes[HIGH_X, second])
+        boxes[LOW_Y, piece] = min(boxes[LOW_Y, first], boxes[LOW_Y, second])
+        boxes[HIGH_Y, piece] = max(boxes[HIGH_Y, first], boxes[HIGH_Y, second])
+        half_planes[piece] = half_planes[first] & half_planes[second]
+        ends[0, piece] = ends[0, first]
+        ends[1, piece] = ends[1, second]
+    return first_point
 
 
 @kernel
-def are_one(nodes, along_j):
-    """Are two opposite sides of `nodes` the same nodes: i_min and i_max, or the other two?"""
+def are_same_sides(nodes, along_j):
+    """Whether two opposite sides of `nodes` are the same nodes: i_min and i_max, or the others."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     for c in range(2):
         for k in range((nj if along_j else ni) + 1):
@@ -154,7 +167,7 @@ def count_cut_edges(nodes, side):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     count = nj if side < J_MIN else ni
-    if are_one(nodes, side < J_MIN):
+    if are_same_sides(nodes, side < J_MIN):
         return count
     for k in range(count + 1):
         i, j = find_node(side, k, 0, ni, nj)
@@ -166,7 +179,7 @@ def count_cut_edges(nodes, side):
 
 @kernel
 def is_cut(edge, ni, nj, cuts):
-    """Does the polygon's edge lie on another one; `cuts`: `count_cut_edges` of each side."""
+    """Whether the polygon's edge lies on another one; `cuts`: `count_cut_edges` of each side."""
     if edge < nj:
         side, k, count = I_MIN, edge, nj
     elif edge < nj + ni:
@@ -178,13 +191,44 @@ def is_cut(edge, ni, nj, cuts):
     return k < cuts[side] or k >= count - cuts[side]
 
 
+@inlined
+def push_pairs(first, second, depth, stack):
+    """Put the pairs of parts of two pieces, or of one with itself, on the stack; its new depth."""
+    if first == second:
+        stack[0, depth] = 2 * first
+        stack[1, depth] = 2 * first
+        stack[0, depth + 1] = 2 * first + 1
+        stack[1, depth + 1] = 2 * first + 1
+        stack[0, depth + 2] = 2 * first
+        stack[1, depth + 2] = 2 * first + 1
+        return depth + 3
+    for pair in range(4):
+        stack[0, depth + pair] = 2 * first + (pair & 1)
+        stack[1, depth + pair] = 2 * second + (pair >> 1)
+    return depth + 4
+
+
+@inlined
+def can_pieces_meet(first, second, boxes, half_planes, ends):
+    """Whether two pieces, or one with itself, may meet, by their boxes and half planes (R5.5)."""
+    if first == second:
+        return half_planes[first] == 0
+    if boxes[LOW_X, first] > boxes[HIGH_X, second] or boxes[LOW_X, second] > boxes[HIGH_X, first]:
+        return False
+    if boxes[LOW_Y, first] > boxes[HIGH_Y, second] or boxes[LOW_Y, second] > boxes[HIGH_Y, first]:
+        return False
+    # neighbours that run into one half plane
+    are_neighbours = ends[1, first] == ends[0, second]
+    return not (are_neighbours and (half_planes[first] & half_planes[second]) != 0)
+
+
 @kernel
-def search_meeting(nodes, line, boxes, ways, ends, stack):
+def search_meeting(nodes, line, boxes, half_planes, ends, stack):
     """A pair of edges that may meet, (first, second); (-1, -1) where there is none.
 
     (-2, k) where edge k has no length.  Scratch: `line` (2, 2 ni + 2 nj + 1), `boxes` (4, 2n),
-    `ways` (2n,), `ends` (2, 2n) with n leaves, a power of 2 of at least a LEAF_EDGES-th of the
-    edges; `stack` (2, 64 * 4).
+    `half_planes` (2n,), `ends` (2, 2n) with n leaves, a power of 2 of at least a LEAF_EDGES-th of
+    the edges; `stack` (2, 64 * 4).
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     # the boundary and the tree of its pieces
@@ -198,48 +242,27 @@ def search_meeting(nodes, line, boxes, ways, ends, stack):
     closed = max(cuts) > 0
     count = line.shape[1] - 1
     leaves = boxes.shape[1] // 2
-    short = fill_tree(line, leaves, boxes, ways, ends)
-    if short >= 0:
-        return COINCIDENT_EDGES, short
+    edge_without_length = fill_tree(line, leaves, boxes, half_planes, ends)
+    if edge_without_length >= 0:
+        return COINCIDENT_EDGES, edge_without_length
     # pairs of pieces that may meet, from the whole boundary down
     depth = 1
-    stack[0, 0] = stack[1, 0] = 1
+    stack[0, 0] = 1
+    stack[1, 0] = 1
     while depth > 0:
         depth -= 1
-        one = stack[0, depth]
-        two = stack[1, depth]
-        # a piece with itself: all in one half plane, it cannot meet itself (R5.5)
-        if one == two:
-            if ways[one] != 0:
-                continue
-            if one < leaves:
-                stack[0, depth] = 2 * one
-                stack[1, depth] = 2 * one
-                stack[0, depth + 1] = 2 * one + 1
-                stack[1, depth + 1] = 2 * one + 1
-                stack[0, depth + 2] = 2 * one
-                stack[1, depth + 2] = 2 * one + 1
-                depth += 3
-                continue
-        else:
-            # two pieces: apart, or neighbours in one half plane
-            if boxes[LOW_X, one] > boxes[HIGH_X, two] or boxes[LOW_X, two] > boxes[HIGH_X, one]:
-                continue
-            if boxes[LOW_Y, one] > boxes[HIGH_Y, two] or boxes[LOW_Y, two] > boxes[HIGH_Y, one]:
-                continue
-            if ends[1, one] == ends[0, two] and (ways[one] & ways[two]) != 0:
-                continue
-            if one < leaves:
-                for part in range(4):
-                    stack[0, depth + part] = 2 * one + (part & 1)
-                    stack[1, depth + part] = 2 * two + (part >> 1)
-                depth += 4
-                continue
+        first = stack[0, depth]
+        second = stack[1, depth]
+        if not can_pieces_meet(first, second, boxes, half_planes, ends):
+            continue
+        if first < leaves:
+            depth = push_pairs(first, second, depth, stack)
+            continue
         # leaves: edge by edge
-        for a in range(ends[0, one], ends[1, one]):
+        for a in range(ends[0, first], ends[1, first]):
             if closed and is_cut(a, ni, nj, cuts):
                 continue
-            for b in range(a + 1 if one == two else ends[0, two], ends[1, two]):
+            for b in range(a + 1 if first == second else ends[0, second], ends[1, second]):
                 if closed and is_cut(b, ni, nj, cuts):
                     continue
                 if may_meet(line, a, b, count, closed):
@@ -260,7 +283,7 @@ class BoundaryCheck:
         )  # fmt: skip
 
     def is_simple(self, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
-        """Does the boundary of `nodes` (2, ni+1, nj+1) neither cross nor touch itself?  Exact.
+        """Whether the boundary of `nodes` (2, ni+1, nj+1) does not cross or touch itself; exact.
 
         False as well where two neighbours on it are one point, or a node is not finite.  `cuts`: as
         `find_crossing` takes them.
@@ -268,11 +291,11 @@ class BoundaryCheck:
         return self.is_clear(search_meeting(nodes, *self.scratch)[0], nodes, cuts)
 
     @staticmethod
-    def is_clear(first: int, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
-        """`is_simple`, where `search_meeting` has found `first`."""
-        if first == COINCIDENT_EDGES:
+    def is_clear(first_edge: int, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
+        """`is_simple`, where `search_meeting` has found `first_edge`."""
+        if first_edge == COINCIDENT_EDGES:
             return False
-        return first == NO_CROSSING or find_crossing(nodes, cuts) is None
+        return first_edge == NO_CROSSING or find_crossing(nodes, cuts) is None
 
 
 def walk_boundary(nodes: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]]]:
@@ -295,59 +318,68 @@ def find_crossing(
     besides those that are seen (`find_cut_edges`), a side and two of its nodes each, between which
     the boundary goes out and back.
     """
-    cut = find_cut_edges(nodes, cuts)
+    cut_edges = find_cut_edges(nodes, cuts)
     if cuts:
         nodes = join_cuts(nodes, cuts)
     # edges with a length, without those of cuts
     line, positions = walk_boundary(nodes)
-    following = np.roll(line, -1, axis=1)
-    kept = np.flatnonzero((line != following).any(axis=0))
-    closed = any(edges.any() for edges in cut.values())
+    next_nodes = np.roll(line, -1, axis=1)
+    edges = np.flatnonzero((line != next_nodes).any(axis=0))
+    closed = any(marks.any() for marks in cut_edges.values())
     if closed:
-        kept = kept[[not _is_cut(cut, *positions[k]) for k in kept]]
-    # pairs whose boxes overlap
-    start, end = line[:, kept], following[:, kept]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    near = np.triu(np.ones((kept.size, kept.size), dtype=bool), 1)
-    for k in range(2):
-        near &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
-    first, second = np.nonzero(near)
-    a = start[:, first]
-    b = end[:, first]
-    c = start[:, second]
-    d = end[:, second]
+        edges = edges[[not _is_cut(cut_edges, *positions[k]) for k in edges]]
+    starts, ends = line[:, edges], next_nodes[:, edges]
+    first, second = _find_overlapping(starts, ends)
+    a = starts[:, first]
+    b = ends[:, first]
+    c = starts[:, second]
+    d = ends[:, second]
     # neighbours, which share a node
     if closed:
         leads, follows = (a == d).all(axis=0), (b == c).all(axis=0)
     else:
-        leads, follows = (first == 0) & (second == kept.size - 1), second == first + 1
-    apart = ~(leads | follows)
-    # they meet if one folds back on the other
-    meets = np.zeros(first.size, dtype=bool)
-    for other, one, two in ((leads, b - a, c - d), (follows, a - b, d - c)):
-        if other.any():
-            at = np.flatnonzero(other & ((one * two).sum(axis=0) > 0.0))
-            node, k, n = (a, b, c) if other is leads else (b, a, d)
-            meets[at] |= compute_turns(k[:, at], n[:, at], node[:, at])[0] == 0
+        leads, follows = (first == 0) & (second == edges.size - 1), second == first + 1
+    meets = _fold_back(b, a, c, leads) | _fold_back(a, b, d, follows)
     # others if each has the ends of the other on both sides
-    at = np.flatnonzero(apart)
-    a = a[:, at]
-    b = b[:, at]
-    c = c[:, at]
-    d = d[:, at]
+    pairs = np.flatnonzero(~(leads | follows))
+    a = a[:, pairs]
+    b = b[:, pairs]
+    c = c[:, pairs]
+    d = d[:, pairs]
     across = compute_turns(a, b, c)[0] * compute_turns(a, b, d)[0] <= 0
     across &= compute_turns(c, d, a)[0] * compute_turns(c, d, b)[0] <= 0
-    meets[at] |= across
+    meets[pairs] |= across
     hits = np.flatnonzero(meets)
     if not hits.size:
         return None
-    return positions[kept[first[hits[0]]]], positions[kept[second[hits[0]]]]
+    return positions[edges[first[hits[0]]]], positions[edges[second[hits[0]]]]
 
 
-def _is_cut(cut: dict[str, np.ndarray], side: str, node: int) -> bool:
-    """Is the edge that `walk_boundary` takes from a side's node one of `find_cut_edges`?"""
+def _find_overlapping(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of edges (2, n) whose boxes overlap: indices of the first and of the second ones."""
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    count = starts.shape[1]
+    overlap = np.triu(np.ones((count, count), dtype=bool), 1)
+    for k in range(2):
+        overlap &= (low[k][:, None] <= high[k]) & (low[k] <= high[k][:, None])
+    return np.nonzero(overlap)
+
+
+def _fold_back(first_end, node, second_end, are_neighbours: np.ndarray) -> np.ndarray:
+    """Which pairs of neighbours (n,) go the same way from their common node; points (2, n)."""
+    folds = np.zeros(are_neighbours.size, dtype=bool)
+    if are_neighbours.any():
+        along = ((first_end - node) * (second_end - node)).sum(axis=0)
+        pairs = np.flatnonzero(are_neighbours & (along > 0.0))
+        turns = compute_turns(first_end[:, pairs], second_end[:, pairs], node[:, pairs])[0]
+        folds[pairs] = turns == 0
+    return folds
+
+
+def _is_cut(cut_edges: dict[str, np.ndarray], side: str, node: int) -> bool:
+    """Whether the edge that `walk_boundary` takes from a side's node is one of `find_cut_edges`."""
     edge = node if side in ("i_min", "j_max") else node - 1
-    return bool(cut[side][edge])
+    return bool(cut_edges[side][edge])
 
 
 GROUP_EDGES = 12
@@ -362,7 +394,7 @@ def measure_turn(a_x, a_y, b_x, b_y, c_x, c_y):
 
 @kernel
 def segments_touch(a_x, a_y, b_x, b_y, c_x, c_y, d_x, d_y):
-    """Do the segments a-b and c-d have a point in common?"""
+    """Whether the segments a-b and c-d have a point in common."""
     if max(a_x, b_x) < min(c_x, d_x) or max(c_x, d_x) < min(a_x, b_x):
         return False
     if max(a_y, b_y) < min(c_y, d_y) or max(c_y, d_y) < min(a_y, b_y):
@@ -390,22 +422,29 @@ def fill_boxes(line, group, boxes):
             boxes[2 * c + 1, g] = high
 
 
+@inlined
+def folds_back(line, a, b):
+    """Whether segment b of a polyline, which follows a, goes back along it."""
+    x, y = line[0], line[1]
+    along = (x[b] - x[a]) * (x[b + 1] - x[b]) + (y[b] - y[a]) * (y[b + 1] - y[b])
+    turn = measure_turn(x[a], y[a], x[b], y[b], x[b + 1], y[b + 1])
+    return turn == 0.0 and along < 0.0
+
+
 @kernel
-def find_touching(line, other, same, group, boxes, other_boxes):
+def find_touching(line, other_line, is_same_line, group, boxes, other_boxes):
     """First pair of touching segments (index of their first nodes), or (-1, -1).
 
-    With `same` the two lines are one: neighbouring segments are only tested for folding back.
+    Where both are the same line, neighbouring segments are only tested for folding back.
     """
-    x = line[0]
-    y = line[1]
-    u = other[0]
-    v = other[1]
+    x, y = line[0], line[1]
+    other_x, other_y = other_line[0], other_line[1]
     count = line.shape[1] - 1
-    other_count = other.shape[1] - 1
-    found_a = -1
-    found_b = -1
+    other_count = other_line.shape[1] - 1
+    first_a = -1
+    first_b = -1
     for g in range(boxes.shape[1]):
-        for f in range(g if same else 0, other_boxes.shape[1]):
+        for f in range(g if is_same_line else 0, other_boxes.shape[1]):
             # groups of segments whose boxes are apart
             apart = boxes[LEAST_X, g] > other_boxes[MOST_X, f]
             apart = apart or other_boxes[LEAST_X, f] > boxes[MOST_X, g]
@@ -414,26 +453,24 @@ def find_touching(line, other, same, group, boxes, other_boxes):
             if apart:
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                # the first pair only
-                if found_a >= 0 and a > found_a:
+                # only pairs before the first one so far
+                if first_a >= 0 and a > first_a:
                     break
                 for b in range(f * group, min(other_count, (f + 1) * group)):
-                    if same and b <= a:
+                    if is_same_line and b <= a:
                         continue
-                    # neighbours: folding back
-                    if same and b == a + 1:
-                        back = (x[b] - x[a]) * (x[b + 1] - x[b]) + (y[b] - y[a]) * (y[b + 1] - y[b])
-                        turn = measure_turn(x[a], y[a], x[b], y[b], x[b + 1], y[b + 1])
-                        touch = turn == 0.0 and back < 0.0
+                    if is_same_line and b == a + 1:
+                        touches = folds_back(line, a, b)
                     else:
-                        touch = segments_touch(
-                            x[a], y[a], x[a + 1], y[a + 1], u[b], v[b], u[b + 1], v[b + 1]
-                        )
-                    earlier = found_a < 0 or a < found_a or (a == found_a and b < found_b)
-                    if touch and earlier:
-                        found_a = a
-                        found_b = b
-    return found_a, found_b
+                        touches = segments_touch(
+                            x[a], y[a], x[a + 1], y[a + 1],
+                            other_x[b], other_y[b], other_x[b + 1], other_y[b + 1],
+                        )  # fmt: skip
+                    is_earlier = first_a < 0 or a < first_a or (a == first_a and b < first_b)
+                    if touches and is_earlier:
+                        first_a = a
+                        first_b = b
+    return first_a, first_b
 
 
 def find_self_crossing(line: np.ndarray) -> tuple[int, int] | None:

@@ -23,32 +23,33 @@ Cuts = Sequence[Cut]
 def find_cut_edges(nodes: np.ndarray, cuts: Cuts = ()) -> dict[str, np.ndarray]:
     """Which edges of each side (n,) lie on another edge of a cut, by the side's name; True there.
 
-    Seen without being told: opposite sides that are the same nodes, and a side whose ends are one
-    line, as the wake of a C grid.  `cuts` (`take_cuts`) are told; BadInput for one that is
-    none.
+    Detected: opposite sides that are the same nodes, and a side whose ends are one line, as the
+    wake of a C grid.  Besides, the `cuts` given (`take_cuts`); BadInput for one that is none.
     """
-    found = {}
-    for side, other in OPPOSITE_SIDES.items():
+    cut_edges = {}
+    for side, opposite in OPPOSITE_SIDES.items():
         line = get_side(nodes, side)
-        found[side] = np.full(line.shape[1] - 1, np.array_equal(line, get_side(nodes, other)))
-        _mark_cut(found[side], (line == line[:, ::-1]).all(axis=0))
+        cut_edges[side] = np.full(
+            line.shape[1] - 1, np.array_equal(line, get_side(nodes, opposite))
+        )
+        _mark_cut(cut_edges[side], (line == line[:, ::-1]).all(axis=0))
     for cut in cuts:
         side, first, last = check_cut(cut, nodes)
         line = get_side(nodes, side)[:, first : last + 1]
-        if not _mark_cut(found[side][first:last], _are_one_point(line)):
+        if not _mark_cut(cut_edges[side][first:last], _are_one_point(line)):
             raise BadInput(
                 f"regrid: cuts has {cut!r}: nodes {first} and {last} of side {side} are not the "
                 "same point, or those next to them on the way to each other are not"
             )
-    return found
+    return cut_edges
 
 
-def _mark_cut(edges: np.ndarray, same: np.ndarray) -> bool:
-    """Mark `edges` (n,) of a line from both ends on, as far as `same` (n+1,) nodes are one point.
+def _mark_cut(edges: np.ndarray, coincide: np.ndarray) -> bool:
+    """Mark `edges` (n,) of a line from both ends on, as far as its nodes `coincide` (n+1,).
 
     True if there are any.
     """
-    count = _count_leading(same)
+    count = _count_leading(coincide)
     if count < 2:
         return False
     edges[: count - 1] = True
@@ -56,13 +57,13 @@ def _mark_cut(edges: np.ndarray, same: np.ndarray) -> bool:
     return True
 
 
-def _count_leading(same: np.ndarray) -> int:
-    """How many of `same` (n,) are True before the first that is not."""
-    return same.size if same.all() else int(np.argmin(same))
+def _count_leading(flags: np.ndarray) -> int:
+    """How many of `flags` (n,) are True before the first that is not."""
+    return flags.size if flags.all() else int(np.argmin(flags))
 
 
 def _are_one_point(line: np.ndarray) -> np.ndarray:
-    """Which nodes of a line (2, n) are the ones counted from its other end, up to rounding."""
+    """Which nodes of a line (2, n) coincide with those from its other end, up to rounding."""
     apart = np.abs(line - line[:, ::-1]).max(axis=0)
     return apart <= CUT_ROUNDING * np.hypot(*np.diff(line)).mean()
 
@@ -82,10 +83,10 @@ def check_cut(cut: Cut, nodes: np.ndarray) -> Cut:
     try:
         side, first, last = cut
         count = get_side(nodes, side).shape[1]
-        good = 0 <= first and first + 2 <= last < count and int(first) == first
+        is_valid = 0 <= first and first + 2 <= last < count and int(first) == first
     except (TypeError, ValueError, KeyError):
-        good = False
-    if not good:
+        is_valid = False
+    if not is_valid:
         raise BadInput(f"regrid: cuts has {cut!r}; a cut is {CUT_WORDS}, at least two cells apart")
     return side, int(first), int(last)
 

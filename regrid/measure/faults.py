@@ -1,8 +1,8 @@
-"""What a regridder is given, checked and converted; and why no grid was found, by side and node.
+"""Checks and conversion of what a regridder takes; why no grid was found, by side and node.
 
 Lists, whole numbers, single precision, any order in memory, views and read-only arrays: all become
 C-contiguous float64.  A block far smaller or larger than any body, or so far from the origin that
-its coordinates no longer tell its nodes apart, is refused.  Arrays that need nothing cost two
+its coordinates do not distinguish its nodes, is refused.  Arrays that need nothing cost two
 microseconds, as this runs in front of every regrid.  `explain_failure` is called only after a
 regrid failed, so that good boundaries pay nothing for it.
 
@@ -83,13 +83,13 @@ def convert_numbers(values, name: str) -> np.ndarray:
     if np.ma.is_masked(values):
         raise BadInput(f"regrid: {name} has masked values; give a number for every node")
     try:
-        found = np.asarray(values)
+        array = np.asarray(values)
     except ValueError:
-        found = np.empty(0, dtype=object)
-    if found.dtype.kind not in "iuf":
-        kind = type(values).__name__ if found.dtype.kind == "O" else found.dtype.name
+        array = np.empty(0, dtype=object)
+    if array.dtype.kind not in "iuf":
+        kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype.name
         raise BadInput(f"regrid: {name} must be an array of real numbers, not {kind}")
-    return np.array(found, dtype=FLOAT64, order="C")
+    return np.array(array, dtype=FLOAT64, order="C")
 
 
 def find_unit(nodes: np.ndarray) -> float:
@@ -109,7 +109,7 @@ def choose_unit(size: float) -> float:
 
 @kernel
 def measure_corners_span(nodes):
-    """The longest way, along x or y, from the first corner of `nodes` to its three others, in m."""
+    """The longest distance, along x or y, from the first corner of `nodes` to the others, in m."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     size = 0.0
     for k in range(2):
@@ -120,11 +120,13 @@ def measure_corners_span(nodes):
 
 @kernel
 def are_ordinary(previous, boundary):
-    """Have both grids (2, ni+1, nj+1), by their corners, a usual size and place?  False for NaN."""
+    """Whether both grids (2, ni+1, nj+1), by their corners, have a usual size and place."""
     for nodes in (previous, boundary):
         size = measure_corners_span(nodes)
-        away = abs(nodes[0, 0, 0]) + abs(nodes[1, 0, 0])
-        if not (LEAST_SIZE < size and size < MOST_SIZE and away < MOST_SIZES_FROM_ORIGIN * size):
+        distance = abs(nodes[0, 0, 0]) + abs(nodes[1, 0, 0])
+        if not (
+            LEAST_SIZE < size and size < MOST_SIZE and distance < MOST_SIZES_FROM_ORIGIN * size
+        ):
             return False
     return True
 
@@ -191,68 +193,69 @@ def find_impossible(boundary: np.ndarray) -> tuple[int, int] | None:
             else:
                 regions[i, j] = box
     triangles = list(_list_triangles(ni, nj))
-    given = [tuple(len(regions[node]) == 1 for node in triangle) for triangle in triangles]
+    fixed = [tuple(len(regions[node]) == 1 for node in triangle) for triangle in triangles]
     # triangles with two nodes given cut the third one's region
-    for triangle, known in zip(triangles, given, strict=True):
-        if all(known):
+    for triangle, is_fixed in zip(triangles, fixed, strict=True):
+        if all(is_fixed):
             if _double_area(*(regions[node][0] for node in triangle)) <= -LOOSENED_CUT:
                 return triangle[0]
-        elif sum(known) == 2 and not _cut(regions, triangle, known.index(False)):
-            return triangle[known.index(False)]
+        elif sum(is_fixed) == 2 and not _cut(regions, triangle, is_fixed.index(False)):
+            return triangle[is_fixed.index(False)]
     if ni * nj > MOST_CELLS:
         return None
     # then each region by those of its neighbours, until none shrinks
     for _ in range(NEIGHBOUR_CUT_ROUNDS):
-        changed = False
-        for triangle, known in zip(triangles, given, strict=True):
-            if sum(known) > 1:
+        has_changed = False
+        for triangle, is_fixed in zip(triangles, fixed, strict=True):
+            if sum(is_fixed) > 1:
                 continue
             for free in range(3):
-                if known[free]:
+                if is_fixed[free]:
                     continue
-                before = regions[triangle[free]]
+                region = regions[triangle[free]]
                 if not _cut(regions, triangle, free):
                     return triangle[free]
-                changed = changed or regions[triangle[free]] is not before
-        if not changed:
+                has_changed = has_changed or regions[triangle[free]] is not region
+        if not has_changed:
             break
     return None
 
 
 def _list_triangles(ni: int, nj: int):
     """Corner triangles but for the block's own, anticlockwise, as three nodes (i, j)."""
-    own = {(corner, i % ni, j % nj) for corner, i, j in BLOCK_CORNERS}
+    block_corners = {(corner, i % ni, j % nj) for corner, i, j in BLOCK_CORNERS}
     for i in range(ni):
         for j in range(nj):
             for corner, triangle in enumerate(TRIANGLES):
-                if (corner, i, j) not in own:
+                if (corner, i, j) not in block_corners:
                     yield tuple((i + a, j + b) for a, b in triangle)
 
 
 def _double_area(a: Point, b: Point, c: Point) -> float:
+    """Twice the signed area of a triangle, positive if a, b, c go anticlockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _cut(regions, triangle, free: int) -> bool:
     """Cut one node's region by what those of the others allow; False where nothing is left."""
     p, q, r = (triangle[(free + k) % 3] for k in range(3))
-    here = regions[p]
+    region = regions[p]
     second = regions[q]
     third = regions[r]
-    if len(here) > MOST_VERTICES or len(second) * len(third) > MOST_VERTICES:
+    if len(region) > MOST_VERTICES or len(second) * len(third) > MOST_VERTICES:
         return True
     # All of it is allowed as soon as one place of the others allows all of its vertices.
-    kept: list[Point] = []
+    allowed: list[Point] = []
     for b in second:
         for c in third:
-            part = _clip(here, b, c)
-            if part is here:
+            clipped = _clip(region, b, c)
+            if clipped is region:
                 return True
-            kept += part
-    if not kept:
+            allowed += clipped
+    if not allowed:
         return False
-    one = len(second) * len(third) == 1
-    regions[p] = kept if one else _hull(kept)
+    is_convex = len(second) * len(third) == 1
+    regions[p] = allowed if is_convex else _hull(allowed)
     return True
 
 
@@ -261,20 +264,20 @@ def _clip(polygon: list[Point], b: Point, c: Point) -> list[Point]:
     areas = [_double_area(b, c, point) + LOOSENED_CUT for point in polygon]
     if min(areas) >= 0.0:
         return polygon
-    part = []
+    clipped = []
     for k, (point, area) in enumerate(zip(polygon, areas, strict=True)):
-        before = areas[k - 1]
-        last = polygon[k - 1]
-        if (before < 0.0) != (area < 0.0):
-            t = before / (before - area)
-            part.append((last[0] + t * (point[0] - last[0]), last[1] + t * (point[1] - last[1])))
+        last_area = areas[k - 1]
+        (last_x, last_y), (x, y) = polygon[k - 1], point
+        if (last_area < 0.0) != (area < 0.0):
+            fraction = last_area / (last_area - area)
+            clipped.append((last_x + fraction * (x - last_x), last_y + fraction * (y - last_y)))
         if area >= 0.0:
-            part.append(point)
-    return part
+            clipped.append(point)
+    return clipped
 
 
 def _hull(points: list[Point]) -> list[Point]:
-    """Their convex hull, anticlockwise."""
+    """The convex hull of points, anticlockwise."""
     points = sorted(set(points))
     if len(points) < 3:
         return points
@@ -293,7 +296,7 @@ def explain_failure(
     boundary: np.ndarray,
     trial: np.ndarray | None = None,
     transposed: bool = False,
-    flat: bool = False,
+    too_sharp: bool = False,
     also: str = "",
     grid: np.ndarray | None = None,
     previous: np.ndarray | None = None,
@@ -302,12 +305,12 @@ def explain_failure(
     """The failure to be raised: which side, which of its nodes, and what is wrong with them.
 
     `boundary` (2, ni+1, nj+1) is read on its sides; `trial`, of that shape or transposed, is the
-    grid that came closest, in the frame of a workspace; `flat` says that it is valid, with a corner
-    too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the failure
-    shows, `previous` the grid before, if its way round is to be compared; `cuts` as `find_crossing`
-    takes them.
+    grid that came closest, in the frame of a workspace; `too_sharp` says that it is valid, with a
+    corner too sharp for the equations to be solved.  `also` ends the sentence, `grid` is what the
+    failure shows, `previous` the grid before, if its orientation is to be compared; `cuts` as
+    `find_crossing` takes them.
     """
-    fault = _find_fault(boundary, trial, transposed, flat, previous, cuts)
+    fault = _find_fault(boundary, trial, transposed, too_sharp, previous, cuts)
     return RegridFailure(
         f"{fault.sentence}; {also}" if also else fault.sentence,
         side=fault.side,
@@ -329,35 +332,12 @@ class _Fault(NamedTuple):
 
 
 def _find_fault(
-    boundary, trial, transposed: bool, flat: bool, previous=None, cuts: Cuts = ()
+    boundary, trial, transposed: bool, too_sharp: bool, previous=None, cuts: Cuts = ()
 ) -> _Fault:
     """What is wrong with sides that have no grid; what they show themselves comes first."""
-    line, positions = walk_boundary(boundary)
-    broken = np.flatnonzero(~np.isfinite(line).all(axis=0))
-    if broken.size:
-        side, node = positions[broken[0]]
-        return _Fault("not-finite", "not a finite number", side, (node,))
-    # sides that cross or touch
-    crossing = find_crossing(boundary, cuts)
-    if crossing is not None:
-        common = _find_common_node(boundary, crossing)
-        (side, node), (other_side, other) = common or crossing
-        if common and side == other_side:
-            return _Fault("lines-cross", "they are the same point", side, (node, other))
-        if common:
-            same_point = f"it is the same point as node {other} of side {other_side}"
-            return _Fault("lines-cross", same_point, side, (node,))
-        if side == other_side:
-            return _Fault("lines-cross", "polyline crosses itself", side, (node, other))
-        return _Fault("lines-cross", f"crosses side {other_side} at node {other}", side, (node,))
-    same = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
-    if same.size:
-        side, node = positions[same[0]]
-        doubled = (
-            "the node and its neighbour on the boundary are the same point; a side may shrink to a "
-            "point only as a whole"
-        )
-        return _Fault("no-grid", doubled, side, (node,))
+    fault = _find_side_fault(boundary, cuts)
+    if fault is not None:
+        return fault
     if previous is not None and compute_area(previous) * compute_area(boundary) <= 0.0:
         turned = (
             "the boundary has the opposite orientation to the previous grid; "
@@ -374,16 +354,54 @@ def _find_fault(
             "in convex cells"
         )
         return _Fault("no-grid", impossible, side, (node,))
-    # a grid may exist: where the best trial fails, or without one where edges are shortest
+    return _find_trial_fault(boundary, trial, transposed, too_sharp)
+
+
+def _find_side_fault(boundary, cuts: Cuts) -> _Fault | None:
+    """What the sides themselves show: nodes that are not finite, crossings, nodes in one point."""
+    line, positions = walk_boundary(boundary)
+    not_finite = np.flatnonzero(~np.isfinite(line).all(axis=0))
+    if not_finite.size:
+        side, node = positions[not_finite[0]]
+        return _Fault("not-finite", "not a finite number", side, (node,))
+    # sides that cross or touch
+    crossing = find_crossing(boundary, cuts)
+    if crossing is not None:
+        common = _find_common_node(boundary, crossing)
+        (side, node), (other_side, other_node) = common or crossing
+        if common and side == other_side:
+            return _Fault("lines-cross", "they are the same point", side, (node, other_node))
+        if common:
+            same_point = f"it is the same point as node {other_node} of side {other_side}"
+            return _Fault("lines-cross", same_point, side, (node,))
+        if side == other_side:
+            return _Fault("lines-cross", "polyline crosses itself", side, (node, other_node))
+        crosses = f"crosses side {other_side} at node {other_node}"
+        return _Fault("lines-cross", crosses, side, (node,))
+    # neighbours in one point
+    doubled_nodes = np.flatnonzero((line == np.roll(line, -1, axis=1)).all(axis=0))
+    if doubled_nodes.size:
+        side, node = positions[doubled_nodes[0]]
+        doubled = (
+            "the node and its neighbour on the boundary are the same point; a side may shrink to a "
+            "point only as a whole"
+        )
+        return _Fault("no-grid", doubled, side, (node,))
+    return None
+
+
+def _find_trial_fault(boundary, trial, transposed: bool, too_sharp: bool) -> _Fault:
+    """Where a grid may exist, but none was found: where the trial fails, or edges are shortest."""
     if trial is None or not np.isfinite(trial).all():
+        line, positions = walk_boundary(boundary)
         step = np.hypot(*(np.roll(line, -1, axis=1) - line))
         shortest = int(np.argmin(np.minimum(step, np.roll(step, 1))))
         side, node = positions[shortest]
         return _Fault("no-grid", "no valid grid was found near it", side, (node,))
     i, j = _worst_cell(trial)
     i, j = (j, i) if transposed else (i, j)
-    side, node = _find_nearest_side(i, j, ni - 1, nj - 1)
-    if flat:
+    side, node = _find_nearest_side(i, j, boundary.shape[1] - 2, boundary.shape[2] - 2)
+    if too_sharp:
         too_flat = (
             f"no grid was found near them: cell ({i}, {j}) is too flat for its equations to be "
             "solved; repair the grid there first"
@@ -396,10 +414,10 @@ def _find_fault(
     return _Fault("no-grid", folded, side, (node, node + 1), (i, j))
 
 
-def _find_nearest_side(i: int, j: int, most_i: int, most_j: int) -> tuple[str, int]:
+def _find_nearest_side(i: int, j: int, last_i: int, last_j: int) -> tuple[str, int]:
     """The side nearest to a node or cell by count, and its index there."""
     return min(
-        ((i, "i_min", j), (most_i - i, "i_max", j), (j, "j_min", i), (most_j - j, "j_max", i))
+        ((i, "i_min", j), (last_i - i, "i_max", j), (j, "j_min", i), (last_j - j, "j_max", i))
     )[1:]
 
 

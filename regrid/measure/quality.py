@@ -64,6 +64,7 @@ def take_edges(x0, y0, x1, y1, j):
 
 @inlined
 def square(edge):
+    """The square of a vector's length."""
     return edge[0] * edge[0] + edge[1] * edge[1]
 
 
@@ -161,7 +162,7 @@ def measure_rows(nodes, rows, worst, bad_cells):
             sine, along, across, dot = measure_cell(*edges)
             area_12 = area_1 if area_1 < area_2 else area_2
             area_34 = area_3 if area_3 < area_4 else area_4
-            # Comparisons lose a NaN in one corner; the sum does not.
+            # 0, or NaN where a corner is: comparisons lose it, the sum does not
             not_a_number = 0.0 * (area_1 + area_2 + area_3 + area_4)
             rows[AREA, j] = (area_12 if area_12 < area_34 else area_34) + not_a_number
             rows[SINE, j] = sine
@@ -171,18 +172,18 @@ def measure_rows(nodes, rows, worst, bad_cells):
         sine = rows[SINE, 0]
         aspect = 0.0
         skew = 0.0
-        bad = 0
+        bad_count = 0
         for j in range(nj):
             area = min(area, rows[AREA, j])
             sine = min(sine, rows[SINE, j])
             aspect = max(aspect, rows[ASPECT, j])
             skew = max(skew, rows[SKEW, j])
-            bad += 0 if rows[AREA, j] > 0.0 else 1
+            bad_count += 0 if rows[AREA, j] > 0.0 else 1
         worst[AREA, i] = 0.5 * area
         worst[SINE, i] = sine
         worst[ASPECT, i] = aspect
         worst[SKEW, i] = skew
-        bad_cells[i] = bad
+        bad_cells[i] = bad_count
 
 
 def compute_corner_areas(nodes: np.ndarray) -> np.ndarray:
@@ -239,25 +240,26 @@ def find_bad_cells(nodes: np.ndarray) -> np.ndarray:
     for flat in triangles:
         areas[flat] = np.inf
     least = areas.min(axis=0)
-    bad = ~(least > 0.0)
+    is_bad = ~(least > 0.0)
     edges = max(_longest(np.diff(nodes, axis=axis)) for axis in (1, 2))
-    doubt = np.abs(least) <= 4.0 * ORIENTATION_ERROR_BOUND * edges * edges + UNDERFLOW
-    if doubt.any():
+    is_doubtful = np.abs(least) <= 4.0 * ORIENTATION_ERROR_BOUND * edges * edges + UNDERFLOW
+    if is_doubtful.any():
         signs = compute_corner_signs(nodes)
         for flat in triangles:
             signs[flat] = 1
-        bad = np.where(doubt, ~(signs > 0).all(axis=0), bad)
-    cells = np.argwhere(bad)
+        is_bad = np.where(is_doubtful, ~(signs > 0).all(axis=0), is_bad)
+    cells = np.argwhere(is_bad)
     return cells[np.argsort(least[cells[:, 0], cells[:, 1]], kind="stable")]
 
 
 def _are_surely_convex(nodes: np.ndarray) -> bool:
-    """Are all sines of corners beyond their rounding error?  (Of edges above 1e-77 m.)"""
-    sine, _, bad = reduce_worst(_checked(nodes), np.empty((3, nodes.shape[2] - 1)))
-    return bad == 0 and sine > (8.0 * ORIENTATION_ERROR_BOUND) ** 2
+    """Whether all sines of corners exceed their rounding error (of edges above 1e-77 m)."""
+    sine, _, bad_cells = reduce_worst(_checked(nodes), np.empty((3, nodes.shape[2] - 1)))
+    return bad_cells == 0 and sine > (8.0 * ORIENTATION_ERROR_BOUND) ** 2
 
 
 def _longest(differences: np.ndarray) -> float:
+    """The largest finite component of some vectors."""
     size = np.abs(differences)
     return float(np.where(np.isfinite(size), size, 0.0).max())
 
@@ -322,12 +324,12 @@ def reduce_worst(nodes, rows):
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     sines = rows[0]
     aspects = rows[1]
-    bad = rows[2]
+    bad_counts = rows[2]
     # extremes by column, so that rows vectorise
     for j in range(nj):
         sines[j] = np.inf
         aspects[j] = 0.0
-        bad[j] = 0.0
+        bad_counts[j] = 0.0
     # areas, sine and aspect of the cells of a row
     for i in range(ni):
         x0 = nodes[0, i]
@@ -341,10 +343,10 @@ def reduce_worst(nodes, rows):
             longer = along if along > across else across
             shorter = across if along > across else along
             aspect = longer / shorter
-            good = (area_1 > 0.0) & (area_2 > 0.0) & (area_3 > 0.0) & (area_4 > 0.0)
+            is_convex = (area_1 > 0.0) & (area_2 > 0.0) & (area_3 > 0.0) & (area_4 > 0.0)
             sines[j] = sine if sine < sines[j] else sines[j]
             aspects[j] = aspect if aspect > aspects[j] else aspects[j]
-            bad[j] += 0.0 if good else 1.0
+            bad_counts[j] += 0.0 if is_convex else 1.0
     # extremes of all columns
     sine = sines[0]
     aspect = aspects[0]
@@ -352,7 +354,7 @@ def reduce_worst(nodes, rows):
     for j in range(nj):
         sine = sines[j] if sines[j] < sine else sine
         aspect = aspects[j] if aspects[j] > aspect else aspect
-        count += bad[j]
+        count += bad_counts[j]
     return sine, aspect, int(count)
 
 
@@ -367,8 +369,8 @@ def measure_worst(nodes: np.ndarray) -> tuple[float, float, int, int]:
 
     The same numbers as in `measure_quality`, without the places.
     """
-    sine, aspect, bad = reduce_worst(nodes, np.empty((3, nodes.shape[2] - 1)))
-    if bad or count_triangles(nodes):
+    sine, aspect, bad_cells = reduce_worst(nodes, np.empty((3, nodes.shape[2] - 1)))
+    if bad_cells or count_triangles(nodes):
         quality = measure_quality(nodes)
         return (
             quality.least_scaled_jacobian,
@@ -392,14 +394,14 @@ def compute_first_line_gaps(nodes: np.ndarray, side: str = "i_min") -> np.ndarra
         )
     turned = nodes if side[0] == "i" else nodes.transpose(0, 2, 1)
     turned = turned[:, ::-1] if side.endswith("max") else turned
-    low, high = (
+    low_part, high_part = (
         np.hypot(*(line[:, 1] - line[:, 0])) / np.hypot(*np.diff(line, axis=1)).sum()
         for line in (turned[:, :, 0], turned[:, :, -1])
     )
     part_j = np.linspace(0.0, 1.0, turned.shape[2])[1:-1]
-    first = np.hypot(*(turned[:, 1] - turned[:, 0]))[1:-1]
-    whole = np.hypot(*(turned[:, -1] - turned[:, 0]))[1:-1]
-    return first / (((1.0 - part_j) * low + part_j * high) * whole)
+    first_distance = np.hypot(*(turned[:, 1] - turned[:, 0]))[1:-1]
+    side_distance = np.hypot(*(turned[:, -1] - turned[:, 0]))[1:-1]
+    return first_distance / (((1.0 - part_j) * low_part + part_j * high_part) * side_distance)
 
 
 def measure_first_line_gap(nodes: np.ndarray, side: str = "i_min") -> float:
@@ -408,6 +410,7 @@ def measure_first_line_gap(nodes: np.ndarray, side: str = "i_min") -> float:
 
 
 def _checked(nodes: np.ndarray) -> np.ndarray:
+    """The nodes of a grid as C-contiguous float64; BadInput for another shape."""
     nodes = np.ascontiguousarray(nodes, dtype=np.float64)
     if nodes.ndim != 3 or nodes.shape[0] != 2 or min(nodes.shape[1:]) < 2:
         raise BadInput(f"grid: nodes must have shape (2, ni+1, nj+1), got {nodes.shape}")

@@ -24,7 +24,7 @@ THINNEST_CELL_PART = 0.02  # of the mean size of a block's cells at first: thinn
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
 # of the way to the next node inwards: through a film it is no further in front of the other side
-MOST_FRONT_PART = 0.1
+MOST_FRONT_PART = 0.01
 
 
 @kernel

@@ -113,11 +113,13 @@ def test_a_neck_is_cut_below_a_part_of_a_cell(width):
     assert cut is None or ("body0" in cut and "x = 0.5" in cut)
 
 
+@pytest.mark.parametrize("taper", [0.0, 0.5])
 @pytest.mark.parametrize("gap", [1e-3, 1e-9, -1e-9])
-def test_ends_of_a_body_that_touch_are_no_neck(gap):
+def test_ends_of_a_body_that_touch_are_no_neck(gap, taper):
     """A strip bent to a ring: what is between its two ends is not the body."""
     radius = np.linspace(1.0, 1.4, 5)
-    angle = np.linspace(gap - np.pi, np.pi - gap, 41)[::-1, None]
+    part = np.linspace(1.0, -1.0, 41)[:, None]
+    angle = part * (np.pi - gap) * (1.0 - taper * (radius - 1.0))
     strip = make_body("strip", "Cu", np.array([radius * np.cos(angle), radius * np.sin(angle)]))
     (other,) = make_boxes((9.0, 9.0))
     for body in (strip, other):

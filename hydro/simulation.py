@@ -38,6 +38,7 @@ from shockgrid.regrid.sides import SIDE_NAMES
 LEAST_STEP_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
 # the same where the flow can go on without the line that makes the steps short
 LEAST_STEP_PART_BEFORE_HANDOVER = 0.02
+COLLAPSING_STEP_PART = 1e-4  # the same: so short steps show that a grid cannot follow
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 # that a state has before its first step
 START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
@@ -442,6 +443,17 @@ class Simulation:
             cause="collapse",
             place=Place(name, (fastest.i, fastest.j)),
         )
+
+    def find_collapsing_block(self) -> Block | None:
+        """The block whose grid lets no step happen that gets the run anywhere, if there is one."""
+        clock = self.clock
+        possible = min(clock.retry_dt, clock.cfl / clock.rate)
+        if possible >= COLLAPSING_STEP_PART * clock.first_stable_dt:
+            return None
+        place = self.last_reason.place if self.last_reason is not None else None
+        if clock.retry_dt < np.inf and place is not None:
+            return next((block for block in self._blocks if block.name == place.block), None)
+        return self._blocks[self.small_cells.fastest.block]
 
     def start_row(self) -> dict:
         """History columns of the state before the first step."""

@@ -439,7 +439,7 @@ class Blocks(Problem):
             mesh=deck.mesh,
             geometry=deck.geometry,
             source=make_gravity(*deck.gravity) if any(deck.gravity) else None,
-            find_end=lambda flow: necks.find_cut() if necks is not None else None,
+            find_end=lambda flow: necks and necks.find_cut(flow.find_collapsing_block()),
         )
         necks = Necks(flow.meetings.bodies) if flow.meetings.pairs else None
         return flow

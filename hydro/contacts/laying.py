@@ -99,10 +99,22 @@ def measure_distance_before(mover, k, target, position):
 
 
 @compiled_once
+def measure_shorter(points, k):
+    """Length of the shorter one of the faces beside a node."""
+    shorter = 1e300
+    for a in (k - 1, k):
+        if 0 <= a < points.shape[1] - 1:
+            square = (points[0, a + 1] - points[0, a]) ** 2
+            shorter = min(shorter, (square + (points[1, a + 1] - points[1, a]) ** 2) ** 0.5)
+    return shorter
+
+
+@compiled_once
 def is_laid(k, pins, away, length, back, at_end, ends_line):
     """Whether a node is laid on the other line; see `lay`.
 
-    away: how far its place is outside it, and beside its foot [m]; length: of the face there;
+    away: how far its place is outside it, and beside its foot [m]; length: of the face there, or of
+    the shorter one of its own if that is less;
     at_end: whether it is an end of its own line; ends_line: whether its foot is one of the other's.
     """
     outside, beside = away
@@ -156,7 +168,8 @@ def lay(mover, pins, target, others, how, ways, ends):
         beside = abs(x * dx + y * dy) / length
         at_end = k == 0 or k == last
         ends_line = not straight and is_free_end(target, found)
-        if not is_laid(k, pins, (outside, beside), length, back, at_end, ends_line):
+        shortest = min(length, measure_shorter(points, k))
+        if not is_laid(k, pins, (outside, beside), shortest, back, at_end, ends_line):
             continue
         if not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length:
             continue
@@ -237,17 +250,6 @@ def match(points, line, places, hits, held, ends):
             ends[end, 1] = -0.5 * x
             ends[end, 2] = -0.5 * y
     return met
-
-
-@compiled_once
-def measure_shorter(points, k):
-    """Length of the shorter one of the faces beside a node."""
-    shorter = 1e300
-    for a in (k - 1, k):
-        if 0 <= a < points.shape[1] - 1:
-            square = (points[0, a + 1] - points[0, a]) ** 2
-            shorter = min(shorter, (square + (points[1, a + 1] - points[1, a]) ** 2) ** 0.5)
-    return shorter
 
 
 @compiled_once

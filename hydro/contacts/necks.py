@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shockgrid.hydro.block import Block
 from shockgrid.hydro.contacts.facets import find_depth, lies_away
 from shockgrid.hydro.contacts.parting import (
     GROUPED_FACES,
@@ -20,7 +21,8 @@ from shockgrid.hydro.contacts.parting import (
 from shockgrid.hydro.facets.lines import project
 from shockgrid.regrid.jit import kernel
 
-THINNEST_CELL_PART = 0.02  # of the mean size of a block's cells at first: thinner necks are cut
+THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinner necks are cut
+THINNEST_FOLLOWED_PART = 0.5  # the same where the time step collapses in this block
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
 # of the way to the next node inwards: through a film it is no further in front of the other side
@@ -102,20 +104,34 @@ class Necks:
             surface.fill_inner(inner)
             self.inner[:, span] = inner
 
-    def find_cut(self) -> str | None:
-        """A sentence about the place where a body is cut now, or None."""
+    def find_cut(self, collapsing: Block | None = None) -> str | None:
+        """A sentence about the place where a body is cut now, or None.
+
+        collapsing: the block of which the grid lets the time step collapse, if it does.
+        """
         outlines = self.bodies.outlines
         if self._least_part is None:
             outlines.nodes[...] = self._first_nodes
             _, first = find_thinnest.entry(outlines, self._first_inner, self.sizes, 1.0)
             self._least_part = min(THINNEST_CELL_PART, THINNEST_FIRST_PART * float(first))
         self._read()
-        node, _ = find_thinnest.entry(outlines, self.inner, self.sizes, self._least_part)
+        node, part = find_thinnest.entry(outlines, self.inner, self.sizes, self._least_part)
+        beyond = ""
+        if node == NO_FACE and collapsing is not None:
+            sizes = np.where(self._find_nodes(collapsing), self.sizes, 0.0)
+            node, part = find_thinnest.entry(outlines, self.inner, sizes, THINNEST_FOLLOWED_PART)
+            beyond = ", which no grid follows further"
         if node == NO_FACE:
             return None
         surface = self.bodies.find_surface(int(node))
         x, y = outlines.nodes[:, node]
         return (
-            f"a body is cut: {surface} has come within {self._least_part * self.sizes[node]:.3g} m "
-            f"of another surface of the same body at x = {x:.6g} m, y = {y:.6g} m"
+            f"a body is cut: {surface} has come within {part * self.sizes[node]:.3g} m, {part:.2g} "
+            f"of a cell, of another surface of the same body at x = {x:.6g} m, y = {y:.6g} m"
+            f"{beyond}"
         )
+
+    def _find_nodes(self, block: Block) -> np.ndarray:
+        """Which nodes of the outlines (N,) are a block's."""
+        own = [np.full(s.count + 1, s.block is block) for s in self.bodies.surfaces]
+        return np.concatenate(own)

@@ -22,8 +22,8 @@ from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 
 GROUPED_FACES = 8  # in a box
 MOST_ROUNDS = 20  # of pushing all nodes that lie too deep
-# of the length of the face behind which a node lies: those that are deeper are pushed out, but for
-# this depth, as what lies in front of a face is not in contact with it
+# of the shortest of the face behind which a node lies and those beside it: what is deeper is pushed
+# out, but for the second depth, as what lies in front of a face is not in contact with it
 DEEPEST_NODE_PART = 0.05
 LEFT_DEPTH_PART = 1e-3
 SEARCHED_DEPTH_FACES = 1.0  # longest ones: a node deeper than that is not found
@@ -121,6 +121,16 @@ def looks_at_node(outlines, start, node):
 
 
 @compiled_once
+def measure_shortest(outlines, node, start):
+    """Length of the shortest of the face from `start` on and those beside a node [m]."""
+    square = measure_square(outlines.nodes, start)
+    for face in (outlines.before[node], outlines.after[node]):
+        if face != NO_FACE:
+            square = min(square, measure_square(outlines.nodes, outlines.starts[face]))
+    return square**0.5
+
+
+@compiled_once
 def find_face_behind(outlines, node, body, reach):
     """The face of another body through which a node has come in: (first node, part, depth [m]).
 
@@ -165,7 +175,7 @@ def find_face_behind(outlines, node, body, reach):
         return NO_FACE, 0.0, 0.0
     # where the nearest face does not look at the node, it has come in through another one
     beside = found != NO_FACE and not looks_at_node(outlines, nearest, node)
-    size = DEEPEST_NODE_PART * measure_square(nodes, nearest) ** 0.5
+    size = DEEPEST_NODE_PART * measure_shortest(outlines, node, nearest)
     if 0.0 < nearest_part < 1.0:
         is_inside = find_depth(nodes, nearest, x, y) > (-size if beside else 0.0)
     else:
@@ -198,7 +208,7 @@ def push_node(outlines, node, body, reach):
     start, part, depth = find_face_behind(outlines, node, body, reach)
     if start == NO_FACE:
         return False
-    length = measure_square(nodes, start) ** 0.5
+    length = measure_shortest(outlines, node, start)
     if depth <= DEEPEST_NODE_PART * length:
         return False
     # the node and the two of the face share the way

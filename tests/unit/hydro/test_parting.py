@@ -14,20 +14,23 @@ from shockgrid.regrid.sides import trace_outline
 SIDES = "i_min", "i_max", "j_min", "j_max"
 
 
-def make_boxes(*corners, apart=0.0):
-    """Boxes of 10 x 10 cells of 0.1, from these lower corners on, each `apart` [m] further out."""
+def make_boxes(*corners, apart=0.0, cells=10):
+    """Squares of 1 m from these lower corners on, each `apart` [m] further out.
+
+    The first one of 10 x 10 cells, others of `cells` x `cells`.
+    """
     bodies = []
     for number, (x, y) in enumerate(corners):
         start = x + 3.0 * number * apart, y
-        nodes = box(start, (start[0] + 1.0, start[1] + 1.0), (10, 10))
+        nodes = box(start, (start[0] + 1.0, start[1] + 1.0), 2 * (cells if number else 10,))
         bodies.append(make_body(f"body{number}", "Cu", nodes, 0.0))
         free(bodies[-1], *SIDES)
     return bodies
 
 
-def push_apart(*shifts, longest_way=np.inf):
+def push_apart(*shifts, longest_way=np.inf, cells=10):
     """Boxes that were shifted in a step; the grids after they are pushed apart, how many nodes."""
-    bodies = make_boxes((0.0, 0.0), (0.0, 0.0), apart=1.0)
+    bodies = make_boxes((0.0, 0.0), (0.0, 0.0), apart=1.0, cells=cells)
     simulation = Simulation(bodies, [], t_end=1.0)
     for body, shift in zip(bodies, shifts, strict=True):
         body.nodes_new[...] = body.nodes - body.nodes[:, :1, :1]
@@ -69,6 +72,13 @@ def test_no_node_stays_deep_in_another_body(shift):
     centres = [grid.mean(axis=(1, 2)) for grid in grids]
     middle = 0.5 * (centres[0] + centres[1])
     assert np.abs(middle - 0.5 * (1.0 + np.array(shift))).max() < 0.01
+
+
+def test_depth_is_that_of_the_finer_body():
+    """What is shallow for a long face is deep for the cells of the other body."""
+    grids, moved = push_apart((0.0, 0.0), (0.996, 0.3), cells=40)
+    assert moved > 0
+    assert measure_deepest(grids) <= 0.25 * DEEPEST_NODE_PART
 
 
 @pytest.mark.parametrize("longest_way", [1e-9, 1e-3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import gc
 import graphlib
 import importlib.util
@@ -97,13 +98,19 @@ def shorten(module: str) -> str:
     return inside if inside.split(".")[0] in INNER else module
 
 
+@functools.cache
+def parse(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@functools.cache
 def find_imports() -> dict[str, set[str]]:
     """Project modules that each module imports, those for type checking and in functions too."""
     modules = {name_module(path): path for path in SOURCES}
     found = {}
     for name, path in modules.items():
         targets = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parse(path)):
             if isinstance(node, ast.Import):
                 targets |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -134,7 +141,7 @@ def test_names_that_are_imported_exist():
     """Those inside functions, too, which no start would notice."""
     missing = []
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parse(path)):
             if not isinstance(node, ast.ImportFrom) or not str(node.module).startswith("shockgrid"):
                 continue
             module = importlib.import_module(node.module)

@@ -106,7 +106,8 @@ def test_a_deck_inside_what_was_measured_well_has_no_caution():
 
 def test_the_table_is_packaged_and_sound():
     data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
-    assert PATH.relative_to(ROOT / "problems").as_posix() in data["package-data"]["shockgrid.problems"]
+    packaged = data["package-data"]["shockgrid.problems"]
+    assert PATH.relative_to(ROOT / "problems").as_posix() in packaged
     rows = read_rows()
     assert len({(r.materials, r.mach, r.ratio, r.cells) for r in rows}) == len(rows) > 20
     assert {r.materials for r in rows} == {"gas", "condensed"}

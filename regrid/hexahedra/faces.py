@@ -37,40 +37,42 @@ def measure_lengths(points: np.ndarray, axis: int) -> np.ndarray:
     return np.sqrt((step * step).sum(axis=0))
 
 
-def compute_laws(nodes: np.ndarray) -> list[np.ndarray]:
+def compute_edge_spacings(nodes: np.ndarray) -> list[np.ndarray]:
     """Arc-length spacings (2, 2, n+1) of the twelve block edges, four for each direction.
 
     The first two indices are the low and high ends of the other two directions, in their order.
     An edge of zero length has equal spacing.
     """
-    laws = []
+    spacings = []
     for axis in range(3):
         n = nodes.shape[axis + 1]
-        law = np.empty((2, 2, n))
+        spacing = np.empty((2, 2, n))
         for ends in np.ndindex(2, 2):
             index: list = [-end for end in ends]
             index.insert(axis, slice(None))
             arc = np.cumsum(measure_lengths(nodes[(slice(None), *index)], 0))
-            law[ends][0] = 0.0
-            law[ends][1:] = arc / arc[-1] if arc[-1] > 0.0 else np.linspace(0.0, 1.0, n)[1:]
-        laws.append(law)
-    return laws
+            spacing[ends][0] = 0.0
+            spacing[ends][1:] = arc / arc[-1] if arc[-1] > 0.0 else np.linspace(0.0, 1.0, n)[1:]
+        spacings.append(spacing)
+    return spacings
 
 
 def measure_bend(face: np.ndarray) -> float:
     """Area of a face (3, n, m) over the magnitude of its vector area, minus one; 0 if it is plane.
 
-    Nodes are smoothed by (1, 2, 1)/4 both ways, so that noise does not count as curvature.
+    Nodes are smoothed by (1, 2, 1)/4 both line_weights, so that noise does not count as curvature.
     """
-    smooth = face.copy()
-    smooth[:, 1:-1] = 0.25 * (face[:, :-2] + 2.0 * face[:, 1:-1] + face[:, 2:])
-    once = smooth.copy()
-    smooth[:, :, 1:-1] = 0.25 * (once[:, :, :-2] + 2.0 * once[:, :, 1:-1] + once[:, :, 2:])
-    area = _vector_areas(smooth)
-    total = area.sum(axis=(1, 2))
-    size = np.sqrt((area * area).sum(axis=0)).sum()
-    whole = np.sqrt((total * total).sum())
-    return float(max(0.0, size / whole - 1.0)) if whole > 1e-12 * size else 1e12
+    smoothed = face.copy()
+    smoothed[:, 1:-1] = 0.25 * (face[:, :-2] + 2.0 * face[:, 1:-1] + face[:, 2:])
+    half_smoothed = smoothed.copy()
+    smoothed[:, :, 1:-1] = 0.25 * (
+        half_smoothed[:, :, :-2] + 2.0 * half_smoothed[:, :, 1:-1] + half_smoothed[:, :, 2:]
+    )
+    areas = _vector_areas(smoothed)
+    vector_sum = areas.sum(axis=(1, 2))
+    area_sum = np.sqrt((areas * areas).sum(axis=0)).sum()
+    plane_area = np.sqrt((vector_sum * vector_sum).sum())
+    return float(max(0.0, area_sum / plane_area - 1.0)) if plane_area > 1e-12 * area_sum else 1e12
 
 
 def _vector_areas(face: np.ndarray) -> np.ndarray:
@@ -82,40 +84,40 @@ def _vector_areas(face: np.ndarray) -> np.ndarray:
 
 def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
     """Weights (3,) of the straight lines of each family, with sum 1 (R14.7)."""
-    bends = [
+    excesses = [
         max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + ADDED_FACE_BEND
         for axis in range(3)
     ]
-    squares = np.minimum(bends, 1e6) ** 2
+    squares = np.minimum(excesses, 1e6) ** 2
     return squares / squares.sum()
 
 
 def compute_volume(nodes: np.ndarray) -> float:
     """Volume inside the six faces, positive if i, j, k are oriented like x, y, z."""
-    middle = nodes[:, [0, -1], :, :][:, :, [0, -1], :][..., [0, -1]].mean(axis=(1, 2, 3))
+    centre_of_block = nodes[:, [0, -1], :, :][:, :, [0, -1], :][..., [0, -1]].mean(axis=(1, 2, 3))
     total = 0.0
     for axis in range(3):
         for end in (0, -1):
-            face = get_face(nodes, axis, end) - middle[:, None, None]
-            centre = 0.25 * (
+            face = get_face(nodes, axis, end) - centre_of_block[:, None, None]
+            face_centres = 0.25 * (
                 face[:, 1:, 1:] + face[:, :-1, :-1] + face[:, 1:, :-1] + face[:, :-1, 1:]
             )
             # with this order of diagonals the area of a low face points inwards for axes 0 and 2
-            part = float((centre * _vector_areas(face)).sum()) / 3.0
-            total += part * (1.0 if (end == -1) == (axis != 1) else -1.0)
+            face_volume = float((face_centres * _vector_areas(face)).sum()) / 3.0
+            total += face_volume * (1.0 if (end == -1) == (axis != 1) else -1.0)
     return total
 
 
-class FaceLaws(NamedTuple):
+class FaceLengths(NamedTuple):
     """Inverse conditional lengths of all edges, weights of lines, and the scale of the barrier.
 
     `inverse` [1/m]: shapes (n1, n2+1, n3+1), (n1+1, n2, n3+1), (n1+1, n2+1, n3), scaled so that the
-    mean corner is 1.  `ways` [m]: a quarter of the straight-line weights times their mean length,
-    (n2+1, n3+1), (n1+1, n3+1), (n1+1, n2+1).  `scale` [m2] is sigma of theory R14.
+    mean corner is 1.  `line_weights` [m]: a quarter of the straight-line weights times their mean
+    length, (n2+1, n3+1), (n1+1, n3+1), (n1+1, n2+1).  `scale` [m2] is sigma of theory R14.
     """
 
     inverse: tuple[np.ndarray, np.ndarray, np.ndarray]
-    ways: tuple[np.ndarray, np.ndarray, np.ndarray]
+    line_weights: tuple[np.ndarray, np.ndarray, np.ndarray]
     scale: float
 
 
@@ -126,33 +128,33 @@ class Functional(NamedTuple):
     of the smoothing of denominators, 0 if all corners are positive.
     """
 
-    laws: FaceLaws
+    lengths: FaceLengths
     strength: np.ndarray
     area_weight: float
     e2: float = 0.0
 
 
-def compute_face_laws(nodes: np.ndarray, weights: np.ndarray, conditional: bool) -> FaceLaws:
-    """`FaceLaws` of the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume (R14.2)."""
+def compute_face_lengths(nodes: np.ndarray, weights: np.ndarray, conditional: bool) -> FaceLengths:
+    """`FaceLengths` of the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume (R14.2)."""
     shape = tuple(n - 1 for n in nodes.shape[1:])
     mean_volume = compute_volume(nodes) / np.prod(shape)
     if conditional:
-        laws = [law.mean(axis=(0, 1)) for law in compute_laws(nodes)]
-        lengths = [_spread_lengths(nodes, axis, laws) for axis in range(3)]
+        spacings = [spacing.mean(axis=(0, 1)) for spacing in compute_edge_spacings(nodes)]
+        lengths = [_spread_lengths(nodes, axis, spacings) for axis in range(3)]
     else:
         edge = np.cbrt(mean_volume)
         lengths = [
             np.full([n + (axis != k) for k, n in enumerate(shape)], edge) for axis in range(3)
         ]
-    at_centre = [_to_centres(length, axis) for axis, length in enumerate(lengths)]
-    wanted = float((at_centre[0] * at_centre[1] * at_centre[2]).mean())
-    factor = np.cbrt(mean_volume / wanted)
-    ways = tuple(
+    centre_lengths = [_to_centres(length, axis) for axis, length in enumerate(lengths)]
+    mean_product = float((centre_lengths[0] * centre_lengths[1] * centre_lengths[2]).mean())
+    factor = np.cbrt(mean_volume / mean_product)
+    line_weights = tuple(
         np.ascontiguousarray(0.25 * k * factor * length.mean(axis=axis))
         for axis, (k, length) in enumerate(zip(weights, lengths, strict=True))
     )
     inverse = tuple(1.0 / (factor * length) for length in lengths)
-    return FaceLaws(inverse, ways, float(np.cbrt(mean_volume) ** 2))  # type: ignore[arg-type]
+    return FaceLengths(inverse, line_weights, float(np.cbrt(mean_volume) ** 2))  # type: ignore[arg-type]
 
 
 def compute_face_density(nodes: np.ndarray) -> np.ndarray:
@@ -160,14 +162,14 @@ def compute_face_density(nodes: np.ndarray) -> np.ndarray:
 
     Only the faces of `nodes` (3, n1+1, n2+1, n3+1), of positive volume, are read.
     """
-    inverse = compute_face_laws(nodes, np.zeros(3), True).inverse
+    inverse = compute_face_lengths(nodes, np.zeros(3), True).inverse
     density = np.ones([n - 1 for n in nodes.shape[1:]])
-    for axis, each in enumerate(inverse):
-        density /= _to_centres(1.0 / each, axis)
+    for axis, axis_inverse in enumerate(inverse):
+        density /= _to_centres(1.0 / axis_inverse, axis)
     return density / density.mean()
 
 
-def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.ndarray:
+def _spread_lengths(nodes: np.ndarray, axis: int, spacings: list[np.ndarray]) -> np.ndarray:
     """Conditional lengths of all edges along `axis`, from the four faces with such edges."""
     p, q = (k for k in range(3) if k != axis)
 
@@ -177,15 +179,19 @@ def _spread_lengths(nodes: np.ndarray, axis: int, laws: list[np.ndarray]) -> np.
 
     # arrays (n, across p, across q) in this function
     low_p, high_p, low_q, high_q = (measure(k, end) for k in (p, q) for end in (0, -1))
-    u, v = laws[p][:, None], laws[q]
+    u, v = spacings[p][:, None], spacings[q]
     across_p = low_p[:, None, :] + u * (high_p - low_p)[:, None, :]
     across_q = low_q[:, :, None] + v * (high_q - low_q)[:, :, None]
     ends = across_p[:, :, :1] + v * (across_p[:, :, -1:] - across_p[:, :, :1])
     length = across_p + across_q
     length -= ends
-    least = np.minimum(np.minimum(low_p, high_p)[:, None, :], np.minimum(low_q, high_q)[:, :, None])
-    most = np.maximum(np.maximum(low_p, high_p)[:, None, :], np.maximum(low_q, high_q)[:, :, None])
-    np.clip(length, least, most, out=length)
+    shortest = np.minimum(
+        np.minimum(low_p, high_p)[:, None, :], np.minimum(low_q, high_q)[:, :, None]
+    )
+    longest = np.maximum(
+        np.maximum(low_p, high_p)[:, None, :], np.maximum(low_q, high_q)[:, :, None]
+    )
+    np.clip(length, shortest, longest, out=length)
     np.maximum(length, LEAST_LENGTH * length.mean(), out=length)
     return np.ascontiguousarray(np.moveaxis(length, 0, axis))
 
@@ -203,15 +209,15 @@ CROSSING_ITERATIONS = 3  # iterations for the intersection of three lines of the
 
 
 @kernel(allocates=False)
-def mix(law, i, u, v):
+def mix(spacing, i, u, v):
     """Spacing interpolated between its four edges at the fractions u, v."""
-    low = law[0, 0, i] + v * (law[0, 1, i] - law[0, 0, i])
-    high = law[1, 0, i] + v * (law[1, 1, i] - law[1, 0, i])
+    low = spacing[0, 0, i] + v * (spacing[0, 1, i] - spacing[0, 0, i])
+    high = spacing[1, 0, i] + v * (spacing[1, 1, i] - spacing[1, 0, i])
     return low + u * (high - low)
 
 
 @kernel(allocates=False)
-def fill_blended(values, law_i, law_j, law_k, rows):
+def fill_blended(values, spacing_i, spacing_j, spacing_k, rows):
     """Boolean sum: fill the interior of `values` (m, n1+1, n2+1, n3+1) from its faces (R14.9).
 
     The spacings (2, 2, n+1) are those of the twelve edges.  `rows` (3, n3+1) is scratch.
@@ -223,11 +229,30 @@ def fill_blended(values, law_i, law_j, law_k, rows):
         for j in range(1, n2):
             for k in range(1, n3):
                 # coordinates of the node: where lines between the edges' spacings cross
-                p = 0.25 * (law_i[0, 0, i] + law_i[0, 1, i] + law_i[1, 0, i] + law_i[1, 1, i])
-                q = 0.25 * (law_j[0, 0, j] + law_j[0, 1, j] + law_j[1, 0, j] + law_j[1, 1, j])
-                r = 0.25 * (law_k[0, 0, k] + law_k[0, 1, k] + law_k[1, 0, k] + law_k[1, 1, k])
+                p = 0.25 * (
+                    spacing_i[0, 0, i]
+                    + spacing_i[0, 1, i]
+                    + spacing_i[1, 0, i]
+                    + spacing_i[1, 1, i]
+                )
+                q = 0.25 * (
+                    spacing_j[0, 0, j]
+                    + spacing_j[0, 1, j]
+                    + spacing_j[1, 0, j]
+                    + spacing_j[1, 1, j]
+                )
+                r = 0.25 * (
+                    spacing_k[0, 0, k]
+                    + spacing_k[0, 1, k]
+                    + spacing_k[1, 0, k]
+                    + spacing_k[1, 1, k]
+                )
                 for _ in range(CROSSING_ITERATIONS):
-                    p, q, r = mix(law_i, i, q, r), mix(law_j, j, p, r), mix(law_k, k, p, q)
+                    p, q, r = (
+                        mix(spacing_i, i, q, r),
+                        mix(spacing_j, j, p, r),
+                        mix(spacing_k, k, p, q),
+                    )
                 rows[0, k] = p
                 rows[1, k] = q
                 rows[2, k] = r
@@ -269,12 +294,12 @@ def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
 
     For a plane block it is the solution of least norm.
     """
-    there = points.reshape(3, -1)
+    centred = points.reshape(3, -1)
     moved = displacement.reshape(3, -1)
-    there = there - there.mean(axis=1, keepdims=True)
+    centred = centred - centred.mean(axis=1, keepdims=True)
     moved = moved - moved.mean(axis=1, keepdims=True)
-    square = there @ there.T
-    return (moved @ there.T) @ np.linalg.pinv(square, rcond=1e-12, hermitian=True)
+    products = centred @ centred.T
+    return (moved @ centred.T) @ np.linalg.pinv(products, rcond=1e-12, hermitian=True)
 
 
 def gather_faces(nodes: np.ndarray) -> np.ndarray:
@@ -291,29 +316,29 @@ def copy_faces(source: np.ndarray, target: np.ndarray) -> None:
             get_face(target, axis, end)[:] = get_face(source, axis, end)
 
 
-def fill_from_faces(nodes: np.ndarray, laws: Sequence[np.ndarray]) -> None:
+def fill_from_faces(nodes: np.ndarray, spacings: Sequence[np.ndarray]) -> None:
     """Interpolate the interior of `nodes` (3, n1+1, n2+1, n3+1) between its faces, in place.
 
-    A Boolean sum; `laws` as `compute_laws` gives them.
+    A Boolean sum; `spacings` as `compute_edge_spacings` gives them.
     """
-    fill_blended(nodes, *laws, np.empty((3, nodes.shape[3])))
+    fill_blended(nodes, *spacings, np.empty((3, nodes.shape[3])))
 
 
 def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> None:
     """Fill `out` with the grid `previous` moved along with the faces of `boundary` (R14.8)."""
-    before = gather_faces(previous)
-    displacement = gather_faces(boundary) - before
-    matrix = fit_affine(before, displacement)
-    whole = np.eye(3) + matrix
-    middle = before.mean(axis=1)
-    shift = displacement.mean(axis=1) - matrix @ middle
-    moved = np.einsum("ab,bijk->aijk", whole, previous)
+    old_faces = gather_faces(previous)
+    displacement = gather_faces(boundary) - old_faces
+    matrix = fit_affine(old_faces, displacement)
+    map = np.eye(3) + matrix
+    old_centre = old_faces.mean(axis=1)
+    shift = displacement.mean(axis=1) - matrix @ old_centre
+    moved = np.einsum("ab,bijk->aijk", map, previous)
     moved += shift[:, None, None, None]
     for axis in range(3):
         for end in (0, -1):
-            missing = get_face(boundary, axis, end) - get_face(moved, axis, end)
-            get_face(out, axis, end)[:] = missing
-    fill_from_faces(out, compute_laws(previous))
+            remaining = get_face(boundary, axis, end) - get_face(moved, axis, end)
+            get_face(out, axis, end)[:] = remaining
+    fill_from_faces(out, compute_edge_spacings(previous))
     out += moved
     copy_faces(boundary, out)
 
@@ -359,38 +384,40 @@ def find_turned_edge(nodes: np.ndarray) -> tuple[str, str, tuple[int, ...]] | No
         node = [(nodes.shape[k + 1] - 1) * e for k, e in zip(across, corner, strict=True)]
         faces = [FACES[2 * k + e] for k, e in zip(across, corner, strict=True)]
         corner.insert(axis, c)
-        of_corner = volumes[4 * corner[0] + 2 * corner[1] + corner[2]]
-        bad = np.flatnonzero(~(of_corner[(*cells[:axis], slice(None), *cells[axis:])] > 0.0))
-        if bad.size:
-            node.insert(axis, int(bad[0]) + c)
+        corner_volumes = volumes[4 * corner[0] + 2 * corner[1] + corner[2]]
+        bad_cells = np.flatnonzero(
+            ~(corner_volumes[(*cells[:axis], slice(None), *cells[axis:])] > 0.0)
+        )
+        if bad_cells.size:
+            node.insert(axis, int(bad_cells[0]) + c)
             return faces[0], faces[1], tuple(node)
     return None
 
 
 def find_folded_face(nodes: np.ndarray) -> tuple[str, tuple[int, ...]] | None:
     """The face node whose four quadrilaterals' normals differ most, if two of them oppose."""
-    worst = 0.0
-    found = None
+    least_cosine = 0.0
+    folded = None
     for axis in range(3):
         for end in (0, -1):
             face = get_face(nodes, axis, end)
             if min(face.shape[1:]) < 3:
                 continue
-            middle = face[:, 1:-1, 1:-1]
-            p = (middle - face[:, :-2, 1:-1], face[:, 2:, 1:-1] - middle)
-            q = (middle - face[:, 1:-1, :-2], face[:, 1:-1, 2:] - middle)
+            inner = face[:, 1:-1, 1:-1]
+            p = (inner - face[:, :-2, 1:-1], face[:, 2:, 1:-1] - inner)
+            q = (inner - face[:, 1:-1, :-2], face[:, 1:-1, 2:] - inner)
             normals = [np.cross(a, b, axis=0) for a in p for b in q]
             with np.errstate(invalid="ignore", divide="ignore"):
                 normals = [n / np.sqrt((n * n).sum(axis=0)) for n in normals]
-            for one, two in combinations(normals, 2):
-                cosine = (one * two).sum(axis=0)
+            for first, second in combinations(normals, 2):
+                cosine = (first * second).sum(axis=0)
                 cosine = np.where(np.isfinite(cosine), cosine, -1.0)
-                if cosine.min() < worst:
-                    worst = float(cosine.min())
+                if cosine.min() < least_cosine:
+                    least_cosine = float(cosine.min())
                     place = [int(m) + 1 for m in np.unravel_index(cosine.argmin(), cosine.shape)]
                     place.insert(axis, 0 if end == 0 else nodes.shape[axis + 1] - 1)
-                    found = FACES[2 * axis - end], tuple(place)
-    return found
+                    folded = FACES[2 * axis - end], tuple(place)
+    return folded
 
 
 def explain_failure(faces: np.ndarray, trial: np.ndarray) -> RegridFailure:
@@ -403,18 +430,19 @@ def explain_failure(faces: np.ndarray, trial: np.ndarray) -> RegridFailure:
         )
     edge = find_turned_edge(faces)
     if edge is not None:
-        side, other, node = edge
+        side, other_face, node = edge
         return RegridFailure(
-            f"node {node}: no corner of positive volume fits between it and face {other}", side=side
+            f"node {node}: no corner of positive volume fits between it and face {other_face}",
+            side=side,
         )
     folded = find_folded_face(faces)
     if folded is not None:
         side, node = folded
         return RegridFailure(f"node {node}: the face folds back on itself there", side=side)
-    bad = find_bad_hexahedra(trial) if np.isfinite(trial).all() else ()
-    if not len(bad):
+    bad_cells = find_bad_hexahedra(trial) if np.isfinite(trial).all() else ()
+    if not len(bad_cells):
         return RegridFailure("no valid grid was found inside the six faces")
-    cell = tuple(map(int, bad[0]))
+    cell = tuple(map(int, bad_cells[0]))
     gaps = [d for k in range(3) for d in (cell[k], faces.shape[k + 1] - 2 - cell[k])]
     side = FACES[int(np.argmin(gaps))]
     return RegridFailure(f"no valid grid was found; the worst cell is {cell}", side=side)

@@ -11,8 +11,8 @@ All results of a row of cells go into one flat scratch array Z at the constant o
 rows of separate arrays, at offsets unknown to the compiler, are not vectorised.  Edges are stored
 there divided by their conditional lengths, three rows per vector.
 
-The straight-line weights `ways` are those of an edge in one of its four cells.  Edges in a face
-have fewer cells, which affects boundary nodes only; their residual is not used.  Note: a row of
+The `line_weights` are those of an edge in one of its four cells.  Edges in a face have fewer cells,
+which affects boundary nodes only; their residual is not used.  Note: a row of
 cells adds to four rows of nodes, so rows are processed in one fixed order; and `strength` is frozen
 in a step, so that a line search compares the same functional.
 
@@ -35,10 +35,10 @@ WITH_MATRIX = 2
 
 HEXAHEDRON_SPAN = 296  # longest row of nodes and its padding
 LONGEST_HEXAHEDRON_ROW = 256  # cells along the third index
-VECTOR_LENGTH = 3 * HEXAHEDRON_SPAN  # from one edge's rows to the next one's
+EDGE_SPAN = 3 * HEXAHEDRON_SPAN  # from one edge's rows to the next one's
 # Eight edges: vectors, inverse lengths, straight-line weights, squared lengths; the vectors of
 # another grid or a direction; eight corner volumes, twice.
-EDGE, INVERSE, STRAIGHT, SQUARE, TURN = (k * HEXAHEDRON_SPAN for k in (0, 24, 32, 40, 48))
+EDGE, INVERSE, STRAIGHT, SQUARE, OTHER_EDGE = (k * HEXAHEDRON_SPAN for k in (0, 24, 32, 40, 48))
 VOLUME_ROW = 72 * HEXAHEDRON_SPAN
 OTHER_VOLUME = 80 * HEXAHEDRON_SPAN
 WEIGHT, SUM, LEAST = (k * HEXAHEDRON_SPAN for k in (88, 89, 90))  # of cells
@@ -53,11 +53,11 @@ EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),
 )  # fmt: skip
 # Edges and forces by name: two along i, two along j, four along k; forces of the corners c = 1.
-I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * VECTOR_LENGTH for k in range(8))
-FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX_ROW + k * VECTOR_LENGTH for k in range(8))
-HI0, HI1, HJ0, HJ1 = (HIGH_ROW + k * VECTOR_LENGTH for k in range(4))
+I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * EDGE_SPAN for k in range(8))
+FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX_ROW + k * EDGE_SPAN for k in range(8))
+HI0, HI1, HJ0, HJ1 = (HIGH_ROW + k * EDGE_SPAN for k in range(4))
 VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3 = (INVERSE + k * HEXAHEDRON_SPAN for k in range(8))
-AWAY_ROW = TURN - EDGE
+OTHER_GRID_OFFSET = OTHER_EDGE - EDGE
 # Edges along i, j, k of the eight corners of a cell, and offsets of the forces on them.
 CORNERS = (
     (I0, J0, K0), (I0, J1, K2), (I1, J0, K1), (I1, J1, K3), (I0 + 1, J0 + 1, K0),
@@ -72,23 +72,26 @@ formula = kernel(allocates=False, forceinline=True)
 
 
 @formula
-def take(Z, at):
-    """The vector whose x lies at `at`."""
-    return Z[at], Z[at + HEXAHEDRON_SPAN], Z[at + 2 * HEXAHEDRON_SPAN]
+def take(Z, start):
+    """The vector whose x lies at `start`."""
+    return Z[start], Z[start + HEXAHEDRON_SPAN], Z[start + 2 * HEXAHEDRON_SPAN]
 
 
 @formula
 def dot(u, v):
+    """Scalar product of two vectors."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 @formula
 def cross(u, v):
+    """Vector product of two vectors."""
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @formula
 def plus(u, v):
+    """Sum of two vectors."""
     return u[0] + v[0], u[1] + v[1], u[2] + v[2]
 
 
@@ -100,50 +103,58 @@ def less(u, factor, v):
 
 @formula
 def take_mean(Z, p, q, r, s):
+    """Mean of four numbers of the scratch."""
     return 0.25 * (Z[p] + Z[q] + Z[r] + Z[s])
 
 
 @formula
 def take_mean_vector(Z, p, q, r, s):
-    two = 2 * HEXAHEDRON_SPAN
+    """Mean of the four vectors whose x lie at p, q, r and s."""
+    second_row = 2 * HEXAHEDRON_SPAN
     return (
         take_mean(Z, p, q, r, s),
         take_mean(
             Z, p + HEXAHEDRON_SPAN, q + HEXAHEDRON_SPAN, r + HEXAHEDRON_SPAN, s + HEXAHEDRON_SPAN
         ),
-        take_mean(Z, p + two, q + two, r + two, s + two),
+        take_mean(Z, p + second_row, q + second_row, r + second_row, s + second_row),
     )
 
 
 @formula
-def find_volume(Z, k, edges, away):
-    """Triple product of the edges (of CORNERS) of corner k of a row, offset by `away` from EDGE."""
-    at = away + k
-    return dot(take(Z, edges[0] + at), cross(take(Z, edges[1] + at), take(Z, edges[2] + at)))
+def find_volume(Z, k, edges, offset):
+    """Triple product of the edges (of CORNERS) of corner k of a row, by `offset` behind EDGE."""
+    start = offset + k
+    return dot(
+        take(Z, edges[0] + start), cross(take(Z, edges[1] + start), take(Z, edges[2] + start))
+    )
 
 
 @kernel(allocates=False)
-def fill_volumes(Z, n, away, out):
-    """Store the triple products of a row's corners in eight rows from `out`; see `find_volume`."""
+def fill_volumes(Z, n, offset, start):
+    """Store the triple products of a row's corners in eight rows from `start` (`find_volume`)."""
     for k in range(n):
-        Z[out + 0 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[0], away)
-        Z[out + 1 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[1], away)
-        Z[out + 2 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[2], away)
-        Z[out + 3 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[3], away)
-        Z[out + 4 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[4], away)
-        Z[out + 5 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[5], away)
-        Z[out + 6 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[6], away)
-        Z[out + 7 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[7], away)
+        Z[start + 0 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[0], offset)
+        Z[start + 1 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[1], offset)
+        Z[start + 2 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[2], offset)
+        Z[start + 3 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[3], offset)
+        Z[start + 4 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[4], offset)
+        Z[start + 5 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[5], offset)
+        Z[start + 6 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[6], offset)
+        Z[start + 7 * HEXAHEDRON_SPAN + k] = find_volume(Z, k, CORNERS[7], offset)
 
 
 @formula
-def add_corner_force(Z, at, edges, shares, steep, p):
+def add_corner_force(Z, start, edges, shares, volume_slope, p):
     """Add the gradient (R14.4) for edge a of a corner with triple product p to its force."""
     a, b, c = edges
-    own, far, near = shares
-    Z[at] += own * a[0] - (far * b[0] + near * c[0]) + steep * p[0]
-    Z[at + HEXAHEDRON_SPAN] += own * a[1] - (far * b[1] + near * c[1]) + steep * p[1]
-    Z[at + 2 * HEXAHEDRON_SPAN] += own * a[2] - (far * b[2] + near * c[2]) + steep * p[2]
+    a_share, b_share, c_share = shares
+    Z[start] += a_share * a[0] - (b_share * b[0] + c_share * c[0]) + volume_slope * p[0]
+    Z[start + HEXAHEDRON_SPAN] += (
+        a_share * a[1] - (b_share * b[1] + c_share * c[1]) + volume_slope * p[1]
+    )
+    Z[start + 2 * HEXAHEDRON_SPAN] += (
+        a_share * a[2] - (b_share * b[2] + c_share * c[2]) + volume_slope * p[2]
+    )
 
 
 @formula
@@ -167,35 +178,44 @@ def add_corner_value(Z, k, edges, forces, area_weight, e2):
     ab = dot(a, b)
     bc = dot(b, c)
     ca = dot(c, a)
-    size = aa + bb + cc + dot(p, p)
-    size += dot(q, q) + dot(r, r)
+    bracket = aa + bb + cc + dot(p, p)
+    bracket += dot(q, q) + dot(r, r)
     inverse = 1.0 / chi
     # value (R14.1)
     weight = Z[WEIGHT + k]
-    Z[SUM + k] += weight * ((size * inverse - 6.0) + area_weight * (chi + inverse - 2.0))
+    Z[SUM + k] += weight * ((bracket * inverse - 6.0) + area_weight * (chi + inverse - 2.0))
     # gradient (R14.4)
-    steep = weight * slope * (area_weight * (1.0 - inverse * inverse) - size * inverse * inverse)
-    two = 2.0 * weight * inverse
+    volume_slope = (
+        weight * slope * (area_weight * (1.0 - inverse * inverse) - bracket * inverse * inverse)
+    )
+    factor = 2.0 * weight * inverse
     i = forces[0] + k
     j = forces[1] + k
     e = forces[2] + k
-    of_a = two * (1.0 + bb + cc)
-    of_b = two * (1.0 + cc + aa)
-    of_c = two * (1.0 + aa + bb)
-    ab = two * ab
-    bc = two * bc
-    ca = two * ca
-    add_corner_force(Z, i, (a, b, c), (of_a, ab, ca), steep, p)
-    add_corner_force(Z, j, (b, c, a), (of_b, bc, ab), steep, q)
-    add_corner_force(Z, e, (c, a, b), (of_c, ca, bc), steep, r)
+    a_share = factor * (1.0 + bb + cc)
+    b_share = factor * (1.0 + cc + aa)
+    c_share = factor * (1.0 + aa + bb)
+    ab = factor * ab
+    bc = factor * bc
+    ca = factor * ca
+    add_corner_force(Z, i, (a, b, c), (a_share, ab, ca), volume_slope, p)
+    add_corner_force(Z, j, (b, c, a), (b_share, bc, ab), volume_slope, q)
+    add_corner_force(Z, e, (c, a, b), (c_share, ca, bc), volume_slope, r)
 
 
 @formula
-def add_corner_turn(Z, at, two, d, hc, bl, back, p):
-    """Add a corner's Hessian product (R14.5) for one edge to its force."""
-    Z[at] += two * (d[0] + hc[0] + bl[0] + back * p[0])
-    Z[at + HEXAHEDRON_SPAN] += two * (d[1] + hc[1] + bl[1] + back * p[1])
-    Z[at + 2 * HEXAHEDRON_SPAN] += two * (d[2] + hc[2] + bl[2] + back * p[2])
+def add_corner_variation(Z, start, factor, change, first_cross, second_cross, volume_change, p):
+    """Add a corner's Hessian product (R14.5) for one edge to its force.
+
+    `change` is that of the edge, `volume_change` that of the volume times its slope `p`.
+    """
+    Z[start] += factor * (change[0] + first_cross[0] + second_cross[0] + volume_change * p[0])
+    Z[start + HEXAHEDRON_SPAN] += factor * (
+        change[1] + first_cross[1] + second_cross[1] + volume_change * p[1]
+    )
+    Z[start + 2 * HEXAHEDRON_SPAN] += factor * (
+        change[2] + first_cross[2] + second_cross[2] + volume_change * p[2]
+    )
 
 
 @formula
@@ -210,44 +230,44 @@ def add_corner_product(Z, k, edges, forces, area_weight, e2):
     a = take(Z, i)
     b = take(Z, j)
     c = take(Z, e)
-    da = take(Z, i + AWAY_ROW)
-    db = take(Z, j + AWAY_ROW)
-    dc = take(Z, e + AWAY_ROW)
+    da = take(Z, i + OTHER_GRID_OFFSET)
+    db = take(Z, j + OTHER_GRID_OFFSET)
+    dc = take(Z, e + OTHER_GRID_OFFSET)
     p = cross(b, c)
     q = cross(c, a)
     r = cross(a, b)
     chi, slope = smooth_area(dot(a, p), e2)
     inverse = 1.0 / chi
-    t = slope * inverse
-    size = dot(a, a) + dot(b, b) + dot(c, c) + dot(p, p)
-    size += dot(q, q) + dot(r, r)
+    slope_over_chi = slope * inverse
+    bracket = dot(a, a) + dot(b, b) + dot(c, c) + dot(p, p)
+    bracket += dot(q, q) + dot(r, r)
     # variations of the three cross products
     dp = plus(cross(db, c), cross(b, dc))
     dq = plus(cross(dc, a), cross(c, da))
     dr = plus(cross(da, b), cross(a, db))
-    change = t * (dot(p, da) + dot(q, db) + dot(r, dc))  # of chi, over chi
+    chi_change = slope_over_chi * (dot(p, da) + dot(q, db) + dot(r, dc))  # of chi, over chi
     # v - dv is used for (a, b, c) and for the cross products
-    da = less(da, change, a)
-    db = less(db, change, b)
-    dc = less(dc, change, c)
-    dp = less(dp, change, p)
-    dq = less(dq, change, q)
-    dr = less(dr, change, r)
-    along = dot(a, da) + dot(b, db) + dot(c, dc)
-    along += dot(p, dp) + dot(q, dq) + dot(r, dr)
-    back = t * (area_weight * change - along)
-    two = 2.0 * Z[WEIGHT + k] * inverse
+    da = less(da, chi_change, a)
+    db = less(db, chi_change, b)
+    dc = less(dc, chi_change, c)
+    dp = less(dp, chi_change, p)
+    dq = less(dq, chi_change, q)
+    dr = less(dr, chi_change, r)
+    bracket_change = dot(a, da) + dot(b, db) + dot(c, dc)
+    bracket_change += dot(p, dp) + dot(q, dq) + dot(r, dr)
+    volume_change = slope_over_chi * (area_weight * chi_change - bracket_change)
+    factor = 2.0 * Z[WEIGHT + k] * inverse
     i = forces[0] + k
     j = forces[1] + k
     e = forces[2] + k
-    add_corner_turn(Z, i, two, da, cross(dq, c), cross(b, dr), back, p)
-    add_corner_turn(Z, j, two, db, cross(dr, a), cross(c, dp), back, q)
-    add_corner_turn(Z, e, two, dc, cross(dp, b), cross(a, dq), back, r)
+    add_corner_variation(Z, i, factor, da, cross(dq, c), cross(b, dr), volume_change, p)
+    add_corner_variation(Z, j, factor, db, cross(dr, a), cross(c, dp), volume_change, q)
+    add_corner_variation(Z, e, factor, dc, cross(dp, b), cross(a, dq), volume_change, r)
 
 
 @kernel(allocates=False)
 def clear_sums(Z, n):
-    """Set FLUX, HIGH and SUM to zero."""
+    """Set the rows from FLUX_ROW and HIGH_ROW on, and SUM, to zero."""
     for row in range(FLUX_ROW, BLOCK_ROW, HEXAHEDRON_SPAN):
         for k in range(n):
             Z[row + k] = 0.0
@@ -257,7 +277,7 @@ def clear_sums(Z, n):
 
 @kernel(allocates=False)
 def fill_values(Z, n, area_weight, e2):
-    """Store values of a row of cells in SUM (R14.1), and forces (R14.4) in FLUX and HIGH.
+    """Store values of a row of cells in SUM (R14.1), and forces (R14.4) from FLUX_ROW on.
 
     One loop over cells with all eight corners: nothing is copied, and corners are independent.
     """
@@ -275,7 +295,7 @@ def fill_values(Z, n, area_weight, e2):
 
 @kernel(allocates=False)
 def fill_products(Z, n, area_weight, e2):
-    """The Hessian (R14.5) of a row of cells times the direction: forces into FLUX and HIGH."""
+    """The Hessian (R14.5) of a row of cells times the direction: forces from FLUX_ROW on."""
     clear_sums(Z, n)
     for k in range(n):
         add_corner_product(Z, k, CORNERS[0], FORCES[0], area_weight, e2)
@@ -289,20 +309,20 @@ def fill_products(Z, n, area_weight, e2):
 
 
 @formula
-def turn_about(weight, edges, shares, half, t, p):
+def compute_edge_block(weight, edges, shares, half_slope, slope_over_chi, p):
     """Diagonal block (xx, xy, xz, yy, yz, zz) of an edge a with two others, triple product p."""
     a, b, c = edges
-    own, ab, ca = shares
-    u = t * (own * a[0] - (ab * b[0] + ca * c[0]) - half * p[0])
-    v = t * (own * a[1] - (ab * b[1] + ca * c[1]) - half * p[1])
-    w = t * (own * a[2] - (ab * b[2] + ca * c[2]) - half * p[2])
+    a_share, b_share, c_share = shares
+    u = slope_over_chi * (a_share * a[0] - (b_share * b[0] + c_share * c[0]) - half_slope * p[0])
+    v = slope_over_chi * (a_share * a[1] - (b_share * b[1] + c_share * c[1]) - half_slope * p[1])
+    w = slope_over_chi * (a_share * a[2] - (b_share * b[2] + c_share * c[2]) - half_slope * p[2])
     return (
-        weight * (own - b[0] * b[0] - c[0] * c[0] - 2.0 * u * p[0]),
+        weight * (a_share - b[0] * b[0] - c[0] * c[0] - 2.0 * u * p[0]),
         -weight * (b[0] * b[1] + c[0] * c[1] + u * p[1] + p[0] * v),
         -weight * (b[0] * b[2] + c[0] * c[2] + u * p[2] + p[0] * w),
-        weight * (own - b[1] * b[1] - c[1] * c[1] - 2.0 * v * p[1]),
+        weight * (a_share - b[1] * b[1] - c[1] * c[1] - 2.0 * v * p[1]),
         -weight * (b[1] * b[2] + c[1] * c[2] + v * p[2] + p[1] * w),
-        weight * (own - b[2] * b[2] - c[2] * c[2] - 2.0 * w * p[2]),
+        weight * (a_share - b[2] * b[2] - c[2] * c[2] - 2.0 * w * p[2]),
     )
 
 
@@ -322,45 +342,70 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         q = cross(c, a)
         r = cross(a, b)
         chi, slope = smooth_area(dot(a, p), e2)
-        t = slope / chi
+        slope_over_chi = slope / chi
         aa = dot(a, a)
         bb = dot(b, b)
         cc = dot(c, c)
         ab = dot(a, b)
         bc = dot(b, c)
         ca = dot(c, a)
-        size = aa + bb + cc + (aa * bb - ab * ab) + (bb * cc - bc * bc) + (cc * aa - ca * ca)
+        bracket = aa + bb + cc + (aa * bb - ab * ab) + (bb * cc - bc * bc) + (cc * aa - ca * ca)
         # z = n_a - (N + lam) p / (2 chi) g_a takes both of the terms with g_a
-        half = 0.5 * (size + area_weight) * t
+        half_slope = 0.5 * (bracket + area_weight) * slope_over_chi
         weight = (Z[SUM + k] + 48.0 * Z[WEIGHT + k]) * 0.5
-        weight = weight / (size + area_weight * (chi * chi + 1.0 - 2.0 * chi))
-        f = take_mean(Z, VI0 + k, VI0 + k + 1, VI1 + k, VI1 + k + 1)
-        g = take_mean(Z, VJ0 + k, VJ0 + k + 1, VJ1 + k, VJ1 + k + 1)
-        h = take_mean(Z, VK0 + k, VK1 + k, VK2 + k, VK3 + k)
-        x = turn_about(weight * f * f, (a, b, c), (1.0 + bb + cc, ab, ca), half, t, p)
-        y = turn_about(weight * g * g, (b, c, a), (1.0 + cc + aa, bc, ab), half, t, q)
-        z = turn_about(weight * h * h, (c, a, b), (1.0 + aa + bb, ca, bc), half, t, r)
-        put_six(Z, BLOCK_ROW + k, x)
-        put_six(
+        weight = weight / (bracket + area_weight * (chi * chi + 1.0 - 2.0 * chi))
+        inverse_i = take_mean(Z, VI0 + k, VI0 + k + 1, VI1 + k, VI1 + k + 1)
+        inverse_j = take_mean(Z, VJ0 + k, VJ0 + k + 1, VJ1 + k, VJ1 + k + 1)
+        inverse_k = take_mean(Z, VK0 + k, VK1 + k, VK2 + k, VK3 + k)
+        block_i = compute_edge_block(
+            weight * inverse_i * inverse_i,
+            (a, b, c),
+            (1.0 + bb + cc, ab, ca),
+            half_slope,
+            slope_over_chi,
+            p,
+        )
+        block_j = compute_edge_block(
+            weight * inverse_j * inverse_j,
+            (b, c, a),
+            (1.0 + cc + aa, bc, ab),
+            half_slope,
+            slope_over_chi,
+            q,
+        )
+        block_k = compute_edge_block(
+            weight * inverse_k * inverse_k,
+            (c, a, b),
+            (1.0 + aa + bb, ca, bc),
+            half_slope,
+            slope_over_chi,
+            r,
+        )
+        store_six(Z, BLOCK_ROW + k, block_i)
+        store_six(
             Z,
             SUMMED_BLOCK_ROW + k,
-            (*plus(plus(x[:3], y[:3]), z[:3]), *plus(plus(x[3:], y[3:]), z[3:])),
+            (
+                *plus(plus(block_i[:3], block_j[:3]), block_k[:3]),
+                *plus(plus(block_i[3:], block_j[3:]), block_k[3:]),
+            ),
         )
 
 
 @formula
-def put_six(Z, at, x):
-    Z[at] = x[0]
-    Z[at + HEXAHEDRON_SPAN] = x[1]
-    Z[at + 2 * HEXAHEDRON_SPAN] = x[2]
-    Z[at + 3 * HEXAHEDRON_SPAN] = x[3]
-    Z[at + 4 * HEXAHEDRON_SPAN] = x[4]
-    Z[at + 5 * HEXAHEDRON_SPAN] = x[5]
+def store_six(Z, start, block):
+    """Store a symmetric matrix (xx, xy, xz, yy, yz, zz) in six rows."""
+    Z[start] = block[0]
+    Z[start + HEXAHEDRON_SPAN] = block[1]
+    Z[start + 2 * HEXAHEDRON_SPAN] = block[2]
+    Z[start + 3 * HEXAHEDRON_SPAN] = block[3]
+    Z[start + 4 * HEXAHEDRON_SPAN] = block[4]
+    Z[start + 5 * HEXAHEDRON_SPAN] = block[5]
 
 
 @kernel(allocates=False)
-def fill_edges(nodes, inverse, i, j, at, Z):
-    """Eight rows of edges of the cells (i, j) over their conditional lengths, from `at` on."""
+def fill_edges(nodes, inverse, i, j, start, Z):
+    """Eight rows of edges of the cells (i, j) over their conditional lengths, from `start` on."""
     for edge in range(8):
         axis = EDGES[edge][0]
         p = i + EDGES[edge][1]
@@ -370,63 +415,63 @@ def fill_edges(nodes, inverse, i, j, at, Z):
             low, high = nodes[component, p, q], nodes[component, p, q, 1:]
             if axis < 2:
                 high = nodes[component, p + 1 - axis, q + axis]
-            row = at + edge * VECTOR_LENGTH + component * HEXAHEDRON_SPAN
+            row = start + edge * EDGE_SPAN + component * HEXAHEDRON_SPAN
             out = Z[row : row + lengths.shape[0]]
             for k in range(lengths.shape[0]):
                 out[k] = (high[k] - low[k]) * lengths[k]
 
 
 @kernel(allocates=False)
-def fill_cell_rows(laws, cells, i, j, n, Z):
+def fill_cell_rows(lengths, cells, i, j, n, Z):
     """Inverse lengths and straight-line weights of the eight rows of edges, weights of `cells`."""
     for edge in range(8):
         axis = EDGES[edge][0]
         p = i + EDGES[edge][1]
         q = j + EDGES[edge][2]
-        inverse = laws.inverse[axis][p, q]
-        way = laws.ways[axis][q if axis == 0 else p]
+        inverse = lengths.inverse[axis][p, q]
+        line_weight = lengths.line_weights[axis][q if axis == 0 else p]
         row = INVERSE + edge * HEXAHEDRON_SPAN
         for k in range(inverse.shape[0]):
             Z[row + k] = inverse[k]
-            Z[row + 8 * HEXAHEDRON_SPAN + k] = way[k] if axis < 2 else way[q]
+            Z[row + 8 * HEXAHEDRON_SPAN + k] = line_weight[k] if axis < 2 else line_weight[q]
     for k in range(n):
-        Z[WEIGHT + k] = 0.125 * laws.scale * cells[k]
+        Z[WEIGHT + k] = 0.125 * lengths.scale * cells[k]
 
 
 @kernel(allocates=False)
-def add_straight(Z, edge, n, row):
+def add_straight(Z, edge, n, node_row):
     """Add the straight-line weights over length of a row of edges to an adjacent row of nodes."""
-    at = INVERSE + edge * HEXAHEDRON_SPAN
-    inverse = Z[at : at + n]
-    way = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + n]
+    start = INVERSE + edge * HEXAHEDRON_SPAN
+    inverse = Z[start : start + n]
+    line_weight = Z[start + STRAIGHT - INVERSE : start + STRAIGHT - INVERSE + n]
     if edge < 4:
         for k in range(1, n):
-            row[k] += inverse[k] * way[k]
+            node_row[k] += inverse[k] * line_weight[k]
     else:
         for k in range(1, n):
-            row[k] += inverse[k - 1] * way[k - 1] + inverse[k] * way[k]
+            node_row[k] += inverse[k - 1] * line_weight[k - 1] + inverse[k] * line_weight[k]
 
 
 @kernel(allocates=False)
-def add_centre_blocks(Z, i, j, n, own, ahead):
+def add_centre_blocks(Z, i, j, n, diagonal_blocks, couplings):
     """Add blocks of a row of cells and its straight lines to those of the line solve (6, nodes)."""
     for entry in range(6):
-        at = SUMMED_BLOCK_ROW + entry * HEXAHEDRON_SPAN
-        total = Z[at : at + n]
-        at = BLOCK_ROW + entry * HEXAHEDRON_SPAN
-        along = Z[at : at + n]
-        diagonal = entry == 0 or entry == 3 or entry == 5
+        start = SUMMED_BLOCK_ROW + entry * HEXAHEDRON_SPAN
+        summed = Z[start : start + n]
+        start = BLOCK_ROW + entry * HEXAHEDRON_SPAN
+        along_i = Z[start : start + n]
+        is_diagonal = entry == 0 or entry == 3 or entry == 5
         for b in range(2):
-            row = ahead[entry, i, j + b]
+            row = couplings[entry, i, j + b]
             for k in range(1, n):
-                row[k] += along[k - 1] + along[k]
-            if diagonal:
+                row[k] += along_i[k - 1] + along_i[k]
+            if is_diagonal:
                 add_straight(Z, b, n, row)
             for a in range(2):
-                row = own[entry, i + a, j + b]
+                row = diagonal_blocks[entry, i + a, j + b]
                 for k in range(1, n):
-                    row[k] += total[k - 1] + total[k]
-                if diagonal:
+                    row[k] += summed[k - 1] + summed[k]
+                if is_diagonal:
                     add_straight(Z, b, n, row)
                     add_straight(Z, 2 + a, n, row)
                     add_straight(Z, 4 + 2 * a + b, n, row)
@@ -435,18 +480,18 @@ def add_centre_blocks(Z, i, j, n, own, ahead):
 @kernel(allocates=False)
 def add_to_nodes(Z, edges, i, j, n, out):
     """Add the forces of the eight rows of edges and of the straight lines to four rows of nodes."""
-    m = n + 1
+    nodes = n + 1
     # forces of the edges: those of their corners plus the straight lines'
     for edge in range(8):
-        at = INVERSE + edge * HEXAHEDRON_SPAN
-        inverse = Z[at : at + m]
-        straight = Z[at + STRAIGHT - INVERSE : at + STRAIGHT - INVERSE + m]
-        for component in range(0, VECTOR_LENGTH, HEXAHEDRON_SPAN):
-            at = edge * VECTOR_LENGTH + component
-            flux = Z[FLUX_ROW + at : FLUX_ROW + at + m]
-            vector = Z[edges + at : edges + at + m]
+        start = INVERSE + edge * HEXAHEDRON_SPAN
+        inverse = Z[start : start + nodes]
+        straight = Z[start + STRAIGHT - INVERSE : start + STRAIGHT - INVERSE + nodes]
+        for component in range(0, EDGE_SPAN, HEXAHEDRON_SPAN):
+            start = edge * EDGE_SPAN + component
+            flux = Z[FLUX_ROW + start : FLUX_ROW + start + nodes]
+            vector = Z[edges + start : edges + start + nodes]
             if edge < 4:
-                high = Z[HIGH_ROW + at : HIGH_ROW + at + m]
+                high = Z[HIGH_ROW + start : HIGH_ROW + start + nodes]
                 for k in range(1, n):
                     flux[k] = (flux[k] + high[k - 1]) * inverse[k] + straight[k] * vector[k]
             else:
@@ -457,11 +502,13 @@ def add_to_nodes(Z, edges, i, j, n, out):
         for b in range(2):
             sign_i, sign_j = 2.0 * a - 1.0, 2.0 * b - 1.0
             for component in range(3):
-                at = FLUX_ROW + component * HEXAHEDRON_SPAN
-                along_i = Z[at + b * VECTOR_LENGTH : at + b * VECTOR_LENGTH + m]
-                along_j = Z[at + (2 + a) * VECTOR_LENGTH : at + (2 + a) * VECTOR_LENGTH + m]
+                start = FLUX_ROW + component * HEXAHEDRON_SPAN
+                along_i = Z[start + b * EDGE_SPAN : start + b * EDGE_SPAN + nodes]
+                along_j = Z[start + (2 + a) * EDGE_SPAN : start + (2 + a) * EDGE_SPAN + nodes]
                 along_k = Z[
-                    at + (4 + 2 * a + b) * VECTOR_LENGTH : at + (4 + 2 * a + b) * VECTOR_LENGTH + m
+                    start + (4 + 2 * a + b) * EDGE_SPAN : start
+                    + (4 + 2 * a + b) * EDGE_SPAN
+                    + nodes
                 ]
                 row = out[component, i + a, j + b]
                 for k in range(1, n):
@@ -475,7 +522,7 @@ def sum_straight(Z, n):
     """Straight-line part of J in a row of cells: half of weight over length times length²."""
     total = 0.0
     for edge in range(8):
-        row = EDGE + edge * VECTOR_LENGTH
+        row = EDGE + edge * EDGE_SPAN
         inverse = INVERSE + edge * HEXAHEDRON_SPAN
         straight = STRAIGHT + edge * HEXAHEDRON_SPAN
         for k in range(n + 1 if edge < 4 else n):
@@ -491,7 +538,7 @@ def round_up(n):
 
 
 @kernel(allocates=False)
-def fill_strength(nodes, inverse, epsilon, most, strength, Z):
+def fill_strength(nodes, inverse, epsilon, strongest, strength, Z):
     """Barrier weight e of every cell (n1, n2, n3) from its least corner sine (R14.3)."""
     n1, n2, n = strength.shape
     for i in range(n1):
@@ -499,9 +546,11 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
             fill_volumes(Z, round_up(n), 0, VOLUME_ROW)
             for edge in range(8):
-                at = EDGE + edge * VECTOR_LENGTH
+                start = EDGE + edge * EDGE_SPAN
                 for k in range(n + 1):
-                    Z[SQUARE + edge * HEXAHEDRON_SPAN + k] = dot(take(Z, at + k), take(Z, at + k))
+                    Z[SQUARE + edge * HEXAHEDRON_SPAN + k] = dot(
+                        take(Z, start + k), take(Z, start + k)
+                    )
             for k in range(n):
                 Z[LEAST + k] = 1.0
             for corner in range(8):
@@ -514,35 +563,37 @@ def fill_strength(nodes, inverse, epsilon, most, strength, Z):
                 r = SQUARE + (4 + 2 * a + b) * HEXAHEDRON_SPAN
                 volume = VOLUME_ROW + corner * HEXAHEDRON_SPAN
                 for k in range(n):
-                    det = Z[volume + k]
-                    least = Z[LEAST + k]
-                    sine = det * abs(det) / (Z[p + k] * Z[q + k] * Z[r + k])
-                    Z[LEAST + k] = sine if sine < least else least
+                    corner_volume = Z[volume + k]
+                    least_sine = Z[LEAST + k]
+                    sine = corner_volume * abs(corner_volume) / (Z[p + k] * Z[q + k] * Z[r + k])
+                    Z[LEAST + k] = sine if sine < least_sine else least_sine
             out = strength[i, j]
             for k in range(n):
-                sine2 = Z[LEAST + k]
-                factor = SHARP_CORNER_SINE / math.sqrt(sine2 if sine2 > 1e-30 else 1e-30)
+                least_square = Z[LEAST + k]
+                factor = SHARP_CORNER_SINE / math.sqrt(
+                    least_square if least_square > 1e-30 else 1e-30
+                )
                 factor = factor if factor > 1.0 else 1.0
-                out[k] = epsilon * (factor if factor < most else most)
+                out[k] = epsilon * (factor if factor < strongest else strongest)
 
 
 @kernel(allocates=False)
 def assemble(nodes, functional, work, gradient, blocks, planes, Z):
     """Value of J, or by `work` its gradient (3, nodes) and the line solve's blocks (2, 6, nodes).
 
-    The value includes the straight-line part only if work is ENERGY.
+    The value includes the straight-line part only if work is ONLY_ENERGY.
 
     functional: `Functional`.  `planes` (n1) receives the part of each plane of cells; the caller
     sums it with `sum()`.
     """
-    laws, strength, area_weight, e2 = functional
+    lengths, strength, area_weight, e2 = functional
     n1, n2, n = strength.shape
     padded = round_up(n)
     for i in range(n1):
         total = 0.0
         for j in range(n2):
-            fill_edges(nodes, laws.inverse, i, j, EDGE, Z)
-            fill_cell_rows(laws, strength[i, j], i, j, n, Z)
+            fill_edges(nodes, lengths.inverse, i, j, EDGE, Z)
+            fill_cell_rows(lengths, strength[i, j], i, j, n, Z)
             fill_values(Z, padded, area_weight, e2)
             if work >= WITH_MATRIX:
                 fill_centre_blocks(Z, padded, area_weight, e2 + CENTRE_E2)
@@ -559,17 +610,17 @@ def assemble(nodes, functional, work, gradient, blocks, planes, Z):
 @kernel(allocates=False)
 def fill_product(nodes, direction, functional, out, Z):
     """`out` = Hessian at `nodes` times `direction`, both (3, nodes); zero on the boundary."""
-    laws, strength, area_weight, e2 = functional
+    lengths, strength, area_weight, e2 = functional
     n1, n2, n = strength.shape
     padded = round_up(n)
     out[:] = 0.0
     for i in range(n1):
         for j in range(n2):
-            fill_edges(nodes, laws.inverse, i, j, EDGE, Z)
-            fill_edges(direction, laws.inverse, i, j, TURN, Z)
-            fill_cell_rows(laws, strength[i, j], i, j, n, Z)
+            fill_edges(nodes, lengths.inverse, i, j, EDGE, Z)
+            fill_edges(direction, lengths.inverse, i, j, OTHER_EDGE, Z)
+            fill_cell_rows(lengths, strength[i, j], i, j, n, Z)
             fill_products(Z, padded, area_weight, e2)
-            add_to_nodes(Z, TURN, i, j, n, out)
+            add_to_nodes(Z, OTHER_EDGE, i, j, n, out)
 
 
 @kernel(allocates=False)
@@ -585,63 +636,63 @@ def compare_corners(nodes, old, inverse, shape, Z):
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
-            fill_edges(old, inverse, i, j, TURN, Z)
+            fill_edges(old, inverse, i, j, OTHER_EDGE, Z)
             fill_volumes(Z, padded, 0, VOLUME_ROW)
-            fill_volumes(Z, padded, AWAY_ROW, OTHER_VOLUME)
+            fill_volumes(Z, padded, OTHER_GRID_OFFSET, OTHER_VOLUME)
             for row in range(VOLUME_ROW, OTHER_VOLUME, HEXAHEDRON_SPAN):
                 for k in range(padded):
-                    was = Z[row + OTHER_VOLUME - VOLUME_ROW + k]
-                    Z[row + OTHER_VOLUME - VOLUME_ROW + k] = was if was > 0.0 else 1.0
+                    old_volume = Z[row + OTHER_VOLUME - VOLUME_ROW + k]
+                    Z[row + OTHER_VOLUME - VOLUME_ROW + k] = old_volume if old_volume > 0.0 else 1.0
                 for k in range(padded):
                     # not min(), which would lose a NaN
-                    now = Z[row + k]
-                    ratio = Z[LEAST + k]
-                    least = Z[SUM + k]
-                    part = now / Z[row + OTHER_VOLUME - VOLUME_ROW + k]
-                    Z[LEAST + k] = ratio if ratio <= part else part
-                    Z[SUM + k] = least if least <= now else now
-    ratio = math.inf
-    least = math.inf
+                    new_volume = Z[row + k]
+                    least_ratio = Z[LEAST + k]
+                    least_volume = Z[SUM + k]
+                    corner_ratio = new_volume / Z[row + OTHER_VOLUME - VOLUME_ROW + k]
+                    Z[LEAST + k] = least_ratio if least_ratio <= corner_ratio else corner_ratio
+                    Z[SUM + k] = least_volume if least_volume <= new_volume else new_volume
+    least_ratio = math.inf
+    least_volume = math.inf
     for k in range(n):
-        if not Z[LEAST + k] >= ratio:
-            ratio = Z[LEAST + k]
-        if not Z[SUM + k] >= least:
-            least = Z[SUM + k]
-    return ratio, least
+        if not Z[LEAST + k] >= least_ratio:
+            least_ratio = Z[LEAST + k]
+        if not Z[SUM + k] >= least_volume:
+            least_volume = Z[SUM + k]
+    return least_ratio, least_volume
 
 
 @kernel(allocates=False)
-def halve_steps(nodes, old, inverse, floor, part, Z):
-    """Halve `part` (nodes) at corners that keep less than `floor` of their volume; count them.
+def halve_steps(nodes, old, inverse, floor, fractions, Z):
+    """Halve `fractions` (nodes) at corners that keep less than `floor` of their volume; count them.
 
     Corners already below their floor in `old` are skipped.
     """
-    n1 = part.shape[0] - 1
-    n2 = part.shape[1] - 1
-    n = part.shape[2] - 1
-    short = 0
+    n1 = fractions.shape[0] - 1
+    n2 = fractions.shape[1] - 1
+    n = fractions.shape[2] - 1
+    failing = 0
     for i in range(n1):
         for j in range(n2):
             # corner volumes, new and old
             fill_edges(nodes, inverse, i, j, EDGE, Z)
-            fill_edges(old, inverse, i, j, TURN, Z)
+            fill_edges(old, inverse, i, j, OTHER_EDGE, Z)
             fill_volumes(Z, round_up(n), 0, VOLUME_ROW)
-            fill_volumes(Z, round_up(n), AWAY_ROW, OTHER_VOLUME)
+            fill_volumes(Z, round_up(n), OTHER_GRID_OFFSET, OTHER_VOLUME)
             # the four nodes of a corner that lost too much move half as far
             for corner in range(8):
                 a = corner & 1
                 b = (corner >> 1) & 1
                 c = corner >> 2
-                now = VOLUME_ROW + corner * HEXAHEDRON_SPAN
-                was = OTHER_VOLUME + corner * HEXAHEDRON_SPAN
+                new_row = VOLUME_ROW + corner * HEXAHEDRON_SPAN
+                old_row = OTHER_VOLUME + corner * HEXAHEDRON_SPAN
                 for k in range(n):
-                    if not Z[now + k] >= floor * Z[was + k]:
-                        short += 1
+                    if not Z[new_row + k] >= floor * Z[old_row + k]:
+                        failing += 1
                         for p, q, r in (
                             (i + a, j + b, k + c),
                             (i + 1 - a, j + b, k + c),
                             (i + a, j + 1 - b, k + c),
                             (i + a, j + b, k + 1 - c),
                         ):
-                            part[p, q, r] *= 0.5
-    return short
+                            fractions[p, q, r] *= 0.5
+    return failing

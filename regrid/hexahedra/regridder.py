@@ -22,9 +22,9 @@ from shockgrid.regrid.hexahedra.faces import (
     Functional,
     carry_faces,
     check_grids_in_space,
-    compute_face_laws,
+    compute_edge_spacings,
+    compute_face_lengths,
     compute_family_weights,
-    compute_laws,
     compute_volume,
     copy_faces,
     explain_failure,
@@ -51,14 +51,14 @@ LEAST_RATIO = 0.1  # least ratio of a predicted corner volume to its old value
 MOVED_GRID_START_RATIO = 0.5
 STEP_RATIO = 0.25  # a step on the final faces keeps this much of every corner, node by node,
 SMOOTH_RATIO = 0.5  # and is followed by another one if it kept less than this
-LEAST_PART = 1.0 / 64.0  # of a Newton step that would lead uphill
+LEAST_STEP_FRACTION = 1.0 / 64.0  # of a Newton step that would lead uphill
 MOST_SHORTENINGS = 40
 MOST_NEWTON_STEPS = 6  # Newton steps after the first
 MOST_POLISH = 15  # Newton steps after untangling, until the residual is below SETTLED_MOVE cells
 SETTLED_MOVE = 0.02
 # the solve that extends the faces' motion inward
-FAR_TOLERANCE = 0.01
-FAR_ITERATIONS = 30
+EXTENSION_TOLERANCE = 0.01
+EXTENSION_ITERATIONS = 30
 # a residual up to HOVERING_FLOORS floors is solved down to DEEP_SOLVE_FLOORS floors
 HOVERING_FLOORS = 1.3
 DEEP_SOLVE_FLOORS = 0.2
@@ -70,6 +70,9 @@ MOST_UNTANGLING = 60  # steps
 MOST_RESCUES = 8  # of one regrid, in all parts of its motion
 SMOOTHINGS = (0.2, 0.1, 0.05, 0.02)  # e of the last steps of an untangling
 LEAST_FALL = 0.1  # of the energy, in the formula for e
+LEAST_E2 = 1e-12
+STEPS_WITHOUT_DESCENT = 4  # that a step counts for, if the energy did not fall at this e
+EVEN_CELL_WEIGHTS = 1e-6  # families whose weights differ by less are ranked by the numbers of cells
 
 
 @dataclass(frozen=True)
@@ -118,11 +121,13 @@ class HexahedraMove(Workspace):
         self.cells = tuple(n - 1 for n in old.shape[1:])
         vars(self).update(vars(space or Workspace(self.cells)))
         self.trial[:] = np.nan  # no values of an earlier call may remain
-        self.iterations = self.rescues = self.sub_moves = 0
+        self.iterations = 0
+        self.rescues = 0
+        self.sub_moves = 0
         self.residual = 0.0
         self.error = 0.0
         self.ratio = np.inf
-        self.moved = False
+        self.has_moved = False  # whether a Newton step was taken
         self.repairs = False  # whether the old grid is folded
         self.start = "displacement"
 
@@ -145,40 +150,45 @@ class HexahedraMove(Workspace):
         if find_turned_edge(self.faces) is not None:
             return False  # no interior makes that corner positive
         if self.repairs:
-            return self._make_anew()
-        begin = self.old.copy()
-        end = self.faces.copy()
+            return self._make_from_faces()
+        first_grid = self.old.copy()
+        last_faces = self.faces.copy()
         for halving in range(1, MOST_MOTION_HALVINGS + 1):
-            parts = 2**halving
-            self.old = begin.copy()
-            self.ratio = np.inf
-            for part in range(1, parts + 1):
-                t = part / parts
-                self.faces = end if part == parts else begin + t * (end - begin)
-                if not self._advance():
-                    break
-                self.old = self.trial.copy()
-            else:
-                self.sub_moves = parts - 1
-                self.start = "halved"
+            if self._move_in_parts(first_grid, last_faces, 2**halving):
                 return True
-        self.old = begin
-        self.faces = end
-        return self._make_anew()
+        self.old = first_grid
+        self.faces = last_faces
+        return self._make_from_faces()
 
-    def _make_anew(self) -> bool:
+    def _move_in_parts(self, first_grid: np.ndarray, last_faces: np.ndarray, parts: int) -> bool:
+        """The whole motion in so many equal parts; True where all of them succeed."""
+        self.old = first_grid.copy()
+        self.ratio = np.inf
+        for part in range(1, parts + 1):
+            fraction = part / parts
+            self.faces = last_faces
+            if part < parts:
+                self.faces = first_grid + fraction * (last_faces - first_grid)
+            if not self._advance():
+                return False
+            self.old = self.trial.copy()
+        self.sub_moves = parts - 1
+        self.start = "halved"
+        return True
+
+    def _make_from_faces(self) -> bool:
         """A grid for the faces alone, which no motion leads to: the first that steps can settle.
 
         It starts from the grid interpolated between the faces, unfolded if necessary; where that
         cannot be done, from the displaced grid.  Where none settles, the one closest to it is
         taken.  True if `trial` is valid.
         """
-        self.laws = compute_face_laws(self.faces, self.weights, self.options.conditional)
+        self.lengths = compute_face_lengths(self.faces, self.weights, self.options.conditional)
         carry_faces(self.old, self.faces, self.base)
         displaced = self.base.copy()
         interpolated = np.empty_like(self.faces)
         copy_faces(self.faces, interpolated)
-        fill_from_faces(interpolated, compute_laws(self.faces))
+        fill_from_faces(interpolated, compute_edge_spacings(self.faces))
         best = displaced
         least_error = np.inf
         self.rescues = 1
@@ -215,50 +225,53 @@ class HexahedraMove(Workspace):
     def _advance(self) -> bool:
         """One part of the motion, from `old` to `faces`; True if `trial` is valid."""
         options = self.options
-        self.laws = compute_face_laws(self.faces, self.weights, options.conditional)
-        if not np.isfinite(self.laws.scale) or not self.laws.scale > 0.0:
+        self.lengths = compute_face_lengths(self.faces, self.weights, options.conditional)
+        if not np.isfinite(self.lengths.scale) or not self.lengths.scale > 0.0:
             return False
         carry_faces(self.old, self.faces, self.base)
-        moved, least = self._compare(self.base)
+        displaced_ratio, least_volume = self._compare(self.base)
         if self.inner == 0:
             self.trial[:] = self.base
             return self._accept()
         self.rescued = False
-        if moved > MOVED_GRID_START_RATIO:
+        # a Newton step from the displaced grid, or the prediction
+        if displaced_ratio > MOVED_GRID_START_RATIO:
             self.trial[:] = self.base
-            self.moved = False
+            self.has_moved = False
             ratio = self._newton(self.old)
-            if not self.moved:
-                self.ratio = min(self.ratio, moved)
-                return least > 0.0
+            if not self.has_moved:
+                self.ratio = min(self.ratio, displaced_ratio)
+                return least_volume > 0.0
         else:
             self.repairs = not self._compare(self.old)[1] > 0.0
             if self.repairs:
                 return False
-            predicted = self._predict(moved)
-            if predicted is None:
+            predicted_ratio = self._predict(displaced_ratio)
+            if predicted_ratio is None:
                 return False
-            ratio = predicted
+            ratio = predicted_ratio
+        # more steps while corners lose much, after untangling until it has settled
         for step in range(MOST_POLISH if self.rescued else MOST_NEWTON_STEPS):
-            smooth = ratio > SMOOTH_RATIO and not (self.rescued and self.error > SETTLED_MOVE)
-            if smooth and step >= options.newton_steps - 1:
+            has_settled = not (self.rescued and self.error > SETTLED_MOVE)
+            if ratio > SMOOTH_RATIO and has_settled and step >= options.newton_steps - 1:
                 break
             ratio = self._newton(self.trial.copy())
         return self._accept()
 
     def _accept(self) -> bool:
         """Compare the result with the old grid; True if every corner is positive."""
-        ratio, least = self._compare(self.trial)
+        ratio, least_volume = self._compare(self.trial)
         self.ratio = min(self.ratio, ratio)
-        return least > 0.0 and ratio > 0.0
+        return least_volume > 0.0 and ratio > 0.0
 
     def _compare(self, nodes: np.ndarray, old: np.ndarray | None = None) -> tuple[float, float]:
+        """Least ratio of corner volumes to those of `old`, and least scaled volume."""
         old = self.old if old is None else old
-        return compare_corners(nodes, old, self.laws.inverse, self.cells, self.scratch)
+        return compare_corners(nodes, old, self.lengths.inverse, self.cells, self.scratch)
 
     def functional(self, e2: float) -> Functional:
         """The current functional, its denominators smoothed by e."""
-        return Functional(self.laws, self.strength, self.options.area_weight, e2)
+        return Functional(self.lengths, self.strength, self.options.area_weight, e2)
 
     def assemble_at(self, nodes: np.ndarray, work: int, e2: float = 0.0) -> float:
         """Value of J with the frozen strength, or gradient and factored lines, as `work` says."""
@@ -273,20 +286,22 @@ class HexahedraMove(Workspace):
         return float(self.planes.sum())
 
     def strengthen(self, nodes: np.ndarray) -> None:
+        """Take the barrier's strength in every cell from the corners of a grid."""
         epsilon = self.options.epsilon
-        most = self.options.strengthening
-        fill_strength(nodes, self.laws.inverse, epsilon, most, self.strength, self.scratch)
+        strongest = self.options.strengthening
+        fill_strength(nodes, self.lengths.inverse, epsilon, strongest, self.strength, self.scratch)
 
     def precondition(self, r: np.ndarray) -> np.ndarray:
+        """The solution along the lines for the residual `r` (3, nodes)."""
         solve_lines(self.blocks, r, self.z)
         return self.z
 
-    def _solve(self, nodes, change, e2: float = 0.0, far: bool = False) -> bool:
+    def _solve(self, nodes, change, e2: float = 0.0, extends_motion: bool = False) -> bool:
         """Add the Newton step of `nodes` to `change`; False if not needed; sets `error` in cells.
 
-        It starts with the smooth part (theory R14.11), enough for a residual at the floor.
+        It starts with the smooth part (theory R14.11), enough for a residual at the floor.  With
+        `extends_motion`, `change` is the faces' motion, which is extended inward.
         """
-
         options = self.options
         functional = self.functional(e2)
 
@@ -294,36 +309,38 @@ class HexahedraMove(Workspace):
             fill_product(nodes, p, functional, self.product, self.scratch)
             return self.product
 
+        # residual of the grid
         r = np.negative(self.gradient, out=self.r)
-        if far:
+        if extends_motion:
             r -= multiply(change)
-        scale = self.laws.scale * self.inner
-        hover = (HOVERING_FLOORS * options.floor) ** 2 * scale
-        first = float((r * self.precondition(r)).sum())
-        self.error = math.sqrt(max(first, 0.0) / scale) if np.isfinite(first) else np.inf
+        scale = self.lengths.scale * self.inner
+        first_square = float((r * self.precondition(r)).sum())
+        is_finite = np.isfinite(first_square)
+        self.error = math.sqrt(max(first_square, 0.0) / scale) if is_finite else np.inf
+        # its smooth part
         corrected = False
         if e2 == 0.0:
-            if not far:
+            if not extends_motion:
                 self.residual = max(self.residual, self.error)
             gain = self.coarse.find(nodes, functional, r, self.scratch)
             corrected = gain > (SMOOTH_FLOOR * options.floor) ** 2 * scale
             if corrected:
                 self.coarse.add(change)
-        settled = first <= options.floor**2 * scale and not far and e2 == 0.0
-        if settled or not np.isfinite(first):
+        is_small = first_square <= options.floor**2 * scale
+        if (is_small and not extends_motion and e2 == 0.0) or not is_finite:
             return corrected
         if corrected:
             np.negative(self.gradient, out=r)
             r -= multiply(change)
-        floor = (
-            options.floor if first > hover and not corrected else DEEP_SOLVE_FLOORS * options.floor
-        )
-        tolerance = FAR_TOLERANCE if far else options.tolerance
-        stop = max(max(floor, ROUND_OFF_STEP) ** 2 * scale, tolerance**2 * first)
-        most = FAR_ITERATIONS if far else options.max_iterations
-        done, _, _ = solve(multiply, self.precondition, r, change, stop, most)
-        self.iterations += done
-        return corrected or done > 0
+        # what is left, by conjugate gradients
+        hovers = not first_square > (HOVERING_FLOORS * options.floor) ** 2 * scale
+        floor = DEEP_SOLVE_FLOORS * options.floor if hovers or corrected else options.floor
+        tolerance = EXTENSION_TOLERANCE if extends_motion else options.tolerance
+        stop = max(max(floor, ROUND_OFF_STEP) ** 2 * scale, tolerance**2 * first_square)
+        most_iterations = EXTENSION_ITERATIONS if extends_motion else options.max_iterations
+        iterations, _, _ = solve(multiply, self.precondition, r, change, stop, most_iterations)
+        self.iterations += iterations
+        return corrected or iterations > 0
 
     def _newton(self, old: np.ndarray) -> float:
         """`trial` = a Newton step from the valid `trial`, shortened node by node if necessary.
@@ -337,45 +354,48 @@ class HexahedraMove(Workspace):
         change[:] = 0.0
         if not self._solve(base, change) or not np.isfinite(change).all():
             return 1.0
-        self.moved = True
+        self.has_moved = True
         np.add(base, change, out=self.trial)
         ratio = self._compare(self.trial, old)[0]
         return ratio if ratio > STEP_RATIO else self._search(base, change, old)
 
     def _search(self, base, change, old) -> float:
         """The largest fraction of the step, shortened at corners as well, that decreases J."""
-        before = self.assemble_at(base, ONLY_ENERGY)
-        part = 1.0
-        while part >= LEAST_PART:
-            steps = np.full(base.shape[1:], part)
+        energy_before = self.assemble_at(base, ONLY_ENERGY)
+        fraction = 1.0
+        while fraction >= LEAST_STEP_FRACTION:
+            steps = np.full(base.shape[1:], fraction)
             for _ in range(MOST_SHORTENINGS):
                 np.multiply(change, steps, out=self.trial)
                 self.trial += base
-                inverse = self.laws.inverse
+                inverse = self.lengths.inverse
                 Z = self.scratch
                 if not halve_steps(self.trial, base, inverse, STEP_RATIO, steps, Z):
-                    if self.assemble_at(self.trial, ONLY_ENERGY) < before:
+                    if self.assemble_at(self.trial, ONLY_ENERGY) < energy_before:
                         return self._compare(self.trial, old)[0]
                     break
-            part *= 0.5
+            fraction *= 0.5
         self.trial[:] = base
         return 1.0
 
-    def _predict(self, moved: float) -> float | None:
-        """Extend the faces' motion inward by the old grid's Hessian, or else by other methods."""
+    def _predict(self, displaced_ratio: float) -> float | None:
+        """Extend the faces' motion inward by the old grid's Hessian, or else by other methods.
+
+        Returns the least ratio of corner volumes, None where no valid grid is found.
+        """
         self.strengthen(self.old)
         self.assemble_at(self.old, WITH_MATRIX)
         change = self.base - self.old
-        self._solve(self.old, change, far=True)
+        self._solve(self.old, change, extends_motion=True)
         np.add(self.old, change, out=self.trial)
         copy_faces(self.faces, self.trial)
-        ratio, worst = self._compare(self.trial)
+        ratio, least_volume = self._compare(self.trial)
         if ratio > LEAST_RATIO:
             return ratio
-        if moved > LEAST_RATIO:
+        if displaced_ratio > LEAST_RATIO:
             self.trial[:] = self.base
             return self._newton(self.base.copy())
-        if not worst > self._compare(self.base)[1]:
+        if not least_volume > self._compare(self.base)[1]:
             self.trial[:] = self.base
         return 0.0 if self._untangle() else None
 
@@ -388,53 +408,58 @@ class HexahedraMove(Workspace):
         self.rescued = True
         self.start = "untangled"
         self.strength[:] = options.epsilon * options.strengthening
-        least = self._compare(self.trial)[1]
+        least_volume = self._compare(self.trial)[1]
         if not np.isfinite(self.trial).all():
             return False
-        e2 = 1e-12 + 0.04 * min(0.0, least) ** 2
-        done = 0
-        while not least > 0.0:
-            if done >= MOST_UNTANGLING:
+        # steps at falling e until nothing is folded
+        e2 = LEAST_E2 + 0.04 * min(0.0, least_volume) ** 2
+        steps = 0
+        while not least_volume > 0.0:
+            if steps >= MOST_UNTANGLING:
                 return False
-            before, after = self._smooth_step(e2)
-            least = self._compare(self.trial)[1]
-            if not after < before and not least > 0.0:
-                done += 4  # no descent at this e
-            root = math.sqrt(least * least + e2)
-            chi = 0.5 * (least + root) if least >= 0.0 else 0.5 * e2 / (root - least)
-            mu = (1.0 - max(LEAST_FALL, 1.0 - after / before)) * chi
-            e2 = max(4.0 * mu * (mu - min(least, 0.0)), 1e-12)
-            done += 1
+            energy_before, energy = self._smooth_step(e2)
+            least_volume = self._compare(self.trial)[1]
+            if not energy < energy_before and not least_volume > 0.0:
+                steps += STEPS_WITHOUT_DESCENT
+            fall = max(LEAST_FALL, 1.0 - energy / energy_before)
+            e2 = _choose_next_e2(e2, least_volume, fall)
+            steps += 1
+        # steps that open what is sharp
         for e in SMOOTHINGS:
-            kept = self.trial.copy()
+            trial_before = self.trial.copy()
             self._smooth_step(e * e)
-            now = self._compare(self.trial)[1]
-            if not now > 0.5 * least:
-                self.trial[:] = kept
+            new_least_volume = self._compare(self.trial)[1]
+            if not new_least_volume > 0.5 * least_volume:
+                self.trial[:] = trial_before
             else:
-                least = now
+                least_volume = new_least_volume
         return True
 
     def _smooth_step(self, e2: float) -> tuple[float, float]:
         """A Newton step of the smoothed functional, halved until J falls: J before and after."""
         base = self.trial.copy()
-        before = self.assemble_at(base, ONLY_ENERGY, e2)
+        energy_before = self.assemble_at(base, ONLY_ENERGY, e2)
         self.assemble_at(base, WITH_MATRIX, e2)
         change = np.zeros_like(base)
         self._solve(base, change, e2)
-        part = 1.0
-        while part >= LEAST_PART:
-            np.multiply(change, part, out=self.trial)
+        fraction = 1.0
+        while fraction >= LEAST_STEP_FRACTION:
+            np.multiply(change, fraction, out=self.trial)
             self.trial += base
-            after = self.assemble_at(self.trial, ONLY_ENERGY, e2)
-            if after < before:
-                return before, after
-            part *= 0.5
+            energy = self.assemble_at(self.trial, ONLY_ENERGY, e2)
+            if energy < energy_before:
+                return energy_before, energy
+            fraction *= 0.5
         self.trial[:] = base
-        return before, before
+        return energy_before, energy_before
 
 
-EVEN_CELL_WEIGHTS = 1e-6  # families whose weights differ by less are ranked by the numbers of cells
+def _choose_next_e2(e2: float, least_volume: float, fall: float) -> float:
+    """The e² that follows, where the energy fell by the part `fall` (theory R14.10)."""
+    root = math.sqrt(least_volume * least_volume + e2)
+    chi = 0.5 * (least_volume + root) if least_volume >= 0.0 else 0.5 * e2 / (root - least_volume)
+    mu = (1.0 - fall) * chi
+    return max(4.0 * mu * (mu - min(least_volume, 0.0)), LEAST_E2)
 
 
 class BarrierRegridder3D:
@@ -449,7 +474,7 @@ class BarrierRegridder3D:
 
     # the options that are fields of HexahedraOptions, and their types
     numbers: ClassVar[dict[str, str]] = {
-        one.name: str(one.type) for one in fields(HexahedraOptions) if one.type != "bool"
+        field.name: str(field.type) for field in fields(HexahedraOptions) if field.type != "bool"
     }
 
     def __init__(self, edge_lengths: str = "conditional", family="auto", **numbers: float):
@@ -475,7 +500,7 @@ class BarrierRegridder3D:
                     + ("1 or more" if name == "strengthening" else "positive")
                 )
         self.options = options
-        self.family = _family_weights(family)
+        self.family = _take_family(family)
         self._workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
@@ -490,11 +515,12 @@ class BarrierRegridder3D:
         if unit != 1.0:  # sixth powers of lengths would not be numbers
             previous = previous / unit
             boundary = boundary / unit
+        # in the order of the families' weights, oriented like x, y, z
         weights = compute_family_weights(boundary) if self.family is None else self.family
         order = _order_axes(weights, previous.shape[1:])
         axes = (0, *(axis + 1 for axis in order))
-        odd = order in ((0, 2, 1), (1, 0, 2), (2, 1, 0))
-        mirrored = (compute_volume(previous) < 0.0) != odd
+        is_odd = order in ((0, 2, 1), (1, 0, 2), (2, 1, 0))
+        mirrored = (compute_volume(previous) < 0.0) != is_odd
         old, faces = (
             np.ascontiguousarray(nodes.transpose(axes)[:: -1 if mirrored else 1])
             for nodes in (previous, boundary)
@@ -506,16 +532,17 @@ class BarrierRegridder3D:
         cells = tuple(n - 1 for n in faces.shape[1:])
         if cells not in self._workspaces:
             self._workspaces[cells] = Workspace(cells)
-        ordered = np.array([weights[axis] for axis in order])
-        move = HexahedraMove(self.options, old, faces, ordered, self._workspaces[cells])
-        valid = compute_volume(faces) > 0.0 and move.run()
-        back = (0, *(int(axis) + 1 for axis in np.argsort(order)))
-        nodes = move.trial[:: -1 if mirrored else 1].transpose(back).copy(order="C")
+        ordered_weights = np.array([weights[axis] for axis in order])
+        move = HexahedraMove(self.options, old, faces, ordered_weights, self._workspaces[cells])
+        is_valid = compute_volume(faces) > 0.0 and move.run()
+        # and back
+        axes_back = (0, *(int(axis) + 1 for axis in np.argsort(order)))
+        nodes = move.trial[:: -1 if mirrored else 1].transpose(axes_back).copy(order="C")
         if unit != 1.0:
             nodes *= unit
             boundary = boundary * unit
-        if not valid:
-            upright = slice(None, None, -1 if mirrored != odd else 1)
+        if not is_valid:
+            upright = slice(None, None, -1 if mirrored != is_odd else 1)
             raise explain_failure(boundary[upright], nodes[upright])
         return RegridResult(nodes, move.report())
 
@@ -532,7 +559,8 @@ def _order_axes(weights, shape: tuple[int, ...]) -> tuple[int, int, int]:
     return first, second, third
 
 
-def _family_weights(family) -> np.ndarray | None:
+def _take_family(family) -> np.ndarray | None:
+    """The weights (3,) of the families, None for those that the faces imply; else BadInput."""
     if isinstance(family, str) and family == "auto":
         return None
     if isinstance(family, str) and family in ("i", "j", "k"):

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from shockgrid.regrid.barrier.coarse_nodes import cut_evenly
-from shockgrid.regrid.hexahedra.faces import FaceLaws, Functional
+from shockgrid.regrid.hexahedra.faces import FaceLengths, Functional
 from shockgrid.regrid.hexahedra.functional import (
     WITH_MATRIX,
     assemble,
@@ -56,19 +56,19 @@ def times(m, v):
 def factor_lines(blocks):
     """Overwrite the diagonal blocks in (2, 6, nodes) by inverse pivots of the lines along i; the
     forward couplings are unchanged."""
-    own = blocks[0]
-    ahead = blocks[1]
-    n1 = own.shape[1] - 1
-    n2 = own.shape[2] - 1
-    n3 = own.shape[3] - 1
+    diagonal_blocks = blocks[0]
+    couplings = blocks[1]
+    n1 = diagonal_blocks.shape[1] - 1
+    n2 = diagonal_blocks.shape[2] - 1
+    n3 = diagonal_blocks.shape[3] - 1
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
-                xx, xy, xz, yy, yz, zz = get_six(own, i, j, k)
+                xx, xy, xz, yy, yz, zz = get_six(diagonal_blocks, i, j, k)
                 # the block less the coupling through the row before
                 if i > 1:
-                    pivot = get_six(own, i - 1, j, k)
-                    c = get_six(ahead, i - 1, j, k)
+                    pivot = get_six(diagonal_blocks, i - 1, j, k)
+                    c = get_six(couplings, i - 1, j, k)
                     u = times(c, times(pivot, (c[0], c[1], c[2])))
                     v = times(c, times(pivot, (c[1], c[3], c[4])))
                     w = times(c, times(pivot, (c[2], c[4], c[5])))
@@ -81,30 +81,30 @@ def factor_lines(blocks):
                 q = xx * zz - xz * xz
                 r = xy * xz - xx * yz
                 inverse = 1.0 / (xx * p[0] + xy * p[1] + xz * p[2])
-                own[0, i, j, k] = p[0] * inverse
-                own[1, i, j, k] = p[1] * inverse
-                own[2, i, j, k] = p[2] * inverse
-                own[3, i, j, k] = q * inverse
-                own[4, i, j, k] = r * inverse
-                own[5, i, j, k] = (xx * yy - xy * xy) * inverse
+                diagonal_blocks[0, i, j, k] = p[0] * inverse
+                diagonal_blocks[1, i, j, k] = p[1] * inverse
+                diagonal_blocks[2, i, j, k] = p[2] * inverse
+                diagonal_blocks[3, i, j, k] = q * inverse
+                diagonal_blocks[4, i, j, k] = r * inverse
+                diagonal_blocks[5, i, j, k] = (xx * yy - xy * xy) * inverse
 
 
 @kernel(allocates=False)
 def solve_lines(blocks, r, z):
     """`z` = solution along every line for the residual `r`, (3, nodes); zeros on the boundary."""
-    own = blocks[0]
-    ahead = blocks[1]
-    n1 = own.shape[1] - 1
-    n2 = own.shape[2] - 1
-    n3 = own.shape[3] - 1
+    diagonal_blocks = blocks[0]
+    couplings = blocks[1]
+    n1 = diagonal_blocks.shape[1] - 1
+    n2 = diagonal_blocks.shape[2] - 1
+    n3 = diagonal_blocks.shape[3] - 1
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
                 right = (r[0, i, j, k], r[1, i, j, k], r[2, i, j, k])
                 if i > 1:
                     before = (z[0, i - 1, j, k], z[1, i - 1, j, k], z[2, i - 1, j, k])
-                    before = times(get_six(own, i - 1, j, k), before)
-                    right = plus(right, times(get_six(ahead, i - 1, j, k), before))
+                    before = times(get_six(diagonal_blocks, i - 1, j, k), before)
+                    right = plus(right, times(get_six(couplings, i - 1, j, k), before))
                 z[0, i, j, k], z[1, i, j, k], z[2, i, j, k] = right
     for i in range(n1 - 1, 0, -1):
         for j in range(1, n2):
@@ -112,36 +112,36 @@ def solve_lines(blocks, r, z):
                 right = (z[0, i, j, k], z[1, i, j, k], z[2, i, j, k])
                 if i < n1 - 1:
                     after = (z[0, i + 1, j, k], z[1, i + 1, j, k], z[2, i + 1, j, k])
-                    right = plus(right, times(get_six(ahead, i, j, k), after))
-                found = times(get_six(own, i, j, k), right)
-                z[0, i, j, k], z[1, i, j, k], z[2, i, j, k] = found
+                    right = plus(right, times(get_six(couplings, i, j, k), after))
+                solved = times(get_six(diagonal_blocks, i, j, k), right)
+                z[0, i, j, k], z[1, i, j, k], z[2, i, j, k] = solved
 
 
-def solve(multiply, precondition, r, x, stop: float, most: int):
+def solve(multiply, precondition, r, x, stop: float, most_iterations: int):
     """Add to `x` the correction that removes the residual `r` (3, nodes), which is overwritten.
 
     `multiply(p)` and `precondition(r)` return fresh or own arrays with zeros on the boundary.
     Returns (iterations, first r.z, last r.z); stops when r.z is `stop` or less.
     """
     z = precondition(r)
-    first_square = rz = float((r * z).sum())
-    done = 0
+    first_square = residual_square = float((r * z).sum())
+    iterations = 0
     p = z.copy()
-    while done < most and rz > stop:
+    while iterations < most_iterations and residual_square > stop:
         product = multiply(p)
         curvature = float((p * product).sum())
         if not curvature > 0.0 or not np.isfinite(curvature):
             break
-        alpha = rz / curvature
+        alpha = residual_square / curvature
         x += alpha * p
         r -= alpha * product
         z = precondition(r)
-        before = rz
-        rz = float((r * z).sum())
-        p *= rz / before
+        square_before = residual_square
+        residual_square = float((r * z).sum())
+        p *= residual_square / square_before
         p += z
-        done += 1
-    return done, first_square, rz
+        iterations += 1
+    return iterations, first_square, residual_square
 
 
 LEAST_CELLS = 1000  # of corrected blocks: in smaller ones the fine solve removes all errors
@@ -163,7 +163,7 @@ def cut_block(cells: int) -> np.ndarray:
 def make_hats(starts: np.ndarray) -> np.ndarray:
     """Values (coarse, fine) of the linear hat functions of coarse nodes; zero for both ends."""
     fine = np.arange(starts[-1] + 1)
-    hats = np.array([np.interp(fine, starts, one) for one in np.eye(starts.size)])
+    hats = np.array([np.interp(fine, starts, unit) for unit in np.eye(starts.size)])
     hats[[0, -1]] = 0.0
     return hats
 
@@ -178,12 +178,12 @@ def contract(hats, values: np.ndarray) -> np.ndarray:
 class CoarseBlock:
     """The coarse nodes of a block of `cells` (3,) and the data for a solve on them.
 
-    `able` is False for blocks that are not corrected.
+    `is_possible` is False for blocks that are not corrected.
     """
 
     def __init__(self, cells: tuple[int, ...]):
-        self.able = math.prod(cells) >= LEAST_CELLS and min(cells) > 1
-        if not self.able:
+        self.is_possible = math.prod(cells) >= LEAST_CELLS and min(cells) > 1
+        if not self.is_possible:
             return
         self.starts = tuple(cut_block(n) for n in cells)
         self.hats = [make_hats(starts) for starts in self.starts]
@@ -193,26 +193,26 @@ class CoarseBlock:
         self.blocks = np.zeros((2, 6, *shape))
         self.planes = np.empty(shape[0] - 1)
 
-    def make_laws(self, laws: FaceLaws) -> FaceLaws:
+    def make_lengths(self, lengths: FaceLengths) -> FaceLengths:
         """Lengths, straight-line weights and scale of the coarse block, from the fine one."""
         inverse = []
-        ways = []
-        apart = [np.diff(starts) for starts in self.starts]
+        line_weights = []
+        edge_counts = [np.diff(starts) for starts in self.starts]
         # fine lines that a coarse one represents, half of those on either side
-        shares = [0.5 * (np.append(m, m[-1]) + np.append(m[0], m)) for m in apart]
+        shares = [0.5 * (np.append(m, m[-1]) + np.append(m[0], m)) for m in edge_counts]
         for axis in range(3):
             across = [k for k in range(3) if k != axis]
             fine = [
                 self.starts[k] if k != axis else np.arange(self.starts[k][-1]) for k in range(3)
             ]
             length = np.add.reduceat(
-                1.0 / laws.inverse[axis][np.ix_(*fine)], self.starts[axis][:-1], axis=axis
+                1.0 / lengths.inverse[axis][np.ix_(*fine)], self.starts[axis][:-1], axis=axis
             )
             inverse.append(np.ascontiguousarray(1.0 / length))
             p, q = across
-            way = laws.ways[axis][np.ix_(self.starts[p], self.starts[q])]
-            ways.append(np.ascontiguousarray(way * np.outer(shares[p], shares[q])))
-        return FaceLaws(tuple(inverse), tuple(ways), laws.scale)  # type: ignore[arg-type]
+            line_weight = lengths.line_weights[axis][np.ix_(self.starts[p], self.starts[q])]
+            line_weights.append(np.ascontiguousarray(line_weight * np.outer(shares[p], shares[q])))
+        return FaceLengths(tuple(inverse), tuple(line_weights), lengths.scale)  # type: ignore[arg-type]
 
     def find(self, nodes, functional: Functional, r, Z) -> float:
         """Solve for the correction of the smooth part of the residual `r`; both (3, nodes).
@@ -220,21 +220,21 @@ class CoarseBlock:
         Returns the residual times the solution; 0 if the coarse block is folded or the block is not
         corrected.
         """
-        if not self.able:
+        if not self.is_possible:
             return 0.0
         # the coarse block, if it is valid
         coarse = np.ascontiguousarray(nodes[np.ix_(range(3), *self.starts)])
         cells = tuple(len(starts) - 1 for starts in self.starts)
-        laws = self.make_laws(functional.laws)
+        lengths = self.make_lengths(functional.lengths)
         strength = functional.strength
-        _, least = compare_corners(coarse, coarse, laws.inverse, cells, Z)
+        _, least = compare_corners(coarse, coarse, lengths.inverse, cells, Z)
         if not least > LEAST_VOLUME:
             return 0.0
         # its barrier: sums over the cells in each of its cells
         for axis in range(3):
             strength = np.add.reduceat(strength, self.starts[axis][:-1], axis=axis)
         strength = np.ascontiguousarray(strength)
-        functional = Functional(laws, strength, functional.area_weight)
+        functional = Functional(lengths, strength, functional.area_weight)
         # its matrix and lines (R14.11)
         for array in (self.gradient, self.blocks, self.solution):
             array[:] = 0.0
@@ -250,9 +250,9 @@ class CoarseBlock:
             return self.z
 
         right = contract(self.hats, r)
-        left = right.copy()
-        stop = COARSE_TOLERANCE**2 * float((left * precondition(left)).sum())
-        solve(multiply, precondition, left, self.solution, stop, COARSE_ITERATIONS)
+        remaining = right.copy()
+        stop = COARSE_TOLERANCE**2 * float((remaining * precondition(remaining)).sum())
+        solve(multiply, precondition, remaining, self.solution, stop, COARSE_ITERATIONS)
         gain = float((right * self.solution).sum())
         return gain if math.isfinite(gain) else 0.0
 

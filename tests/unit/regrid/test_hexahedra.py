@@ -6,7 +6,7 @@ import pytest
 from builders import tensor
 from shockgrid.regrid.domains_in_space import SHAPES, make_moving_block
 from shockgrid.regrid.errors import BadInput, RegridFailure
-from shockgrid.regrid.hexahedra.faces import compute_face_laws, gather_faces
+from shockgrid.regrid.hexahedra.faces import compute_face_lengths, gather_faces
 from shockgrid.regrid.hexahedra.functional import ONLY_ENERGY, WITH_MATRIX, fill_product
 from shockgrid.regrid.hexahedra.regridder import BarrierRegridder3D, HexahedraMove
 from shockgrid.regrid.measure.hexahedra import (
@@ -24,7 +24,7 @@ def graded(cells=(3, 4, 5), power=1.3):
 def begin(nodes, weights=(0.5, 0.3, 0.2), **options):
     """A move on its own faces, its strength and matrix filled."""
     move = HexahedraMove(BarrierRegridder3D(**options).options, nodes, nodes, np.array(weights))
-    move.laws = compute_face_laws(nodes, move.weights, True)
+    move.lengths = compute_face_lengths(nodes, move.weights, True)
     move.strengthen(nodes)
     return move
 
@@ -78,9 +78,9 @@ def test_graded_boxes_are_stationary_and_cost_nothing():
     nodes = graded((4, 3, 5), 1.8)
     move = begin(nodes)
     move.assemble_at(nodes, WITH_MATRIX)
-    assert np.abs(move.gradient[INNER]).max() < 1e-14 * np.sqrt(move.laws.scale)
+    assert np.abs(move.gradient[INNER]).max() < 1e-14 * np.sqrt(move.lengths.scale)
     straight = begin(nodes, (0.0, 0.0, 0.0))
-    assert abs(straight.assemble_at(nodes, ONLY_ENERGY)) < 1e-13 * straight.laws.scale * 60
+    assert abs(straight.assemble_at(nodes, ONLY_ENERGY)) < 1e-13 * straight.lengths.scale * 60
     found = BarrierRegridder3D().regrid(nodes, nodes)
     assert np.abs(found.nodes - nodes).max() < 1e-14 * np.abs(nodes).max()
 
@@ -109,7 +109,7 @@ def test_a_smooth_error_is_mostly_taken_away_at_once():
         settled = BarrierRegridder3D(floor=1e-8, family=(1, 1, 1)).regrid(settled, end).nodes
     thrown = throw_smoothly(settled, start, 0.02)
     move = HexahedraMove(BarrierRegridder3D().options, thrown, end, np.full(3, 1.0 / 3.0))
-    move.laws = compute_face_laws(end, move.weights, True)
+    move.lengths = compute_face_lengths(end, move.weights, True)
     move.strengthen(thrown)
     move.assemble_at(thrown, WITH_MATRIX)
     inner = np.s_[:, 1:-1, 1:-1, 1:-1]

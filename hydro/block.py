@@ -42,6 +42,7 @@ from shockgrid.hydro.perimeter.plan import PerimeterPlan
 from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
 from shockgrid.hydro.rows import HELD_ARRAYS, RHO, P, make_held
 from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.spall.base import SpallLaw
 from shockgrid.hydro.strength.stress import Stress, add_stress_fields, stiffen_wave_law
 from shockgrid.hydro.totals import TileTotals
 from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
@@ -120,6 +121,8 @@ class Block:
     (fields, ni + 2, nj + 2).
     strength: law of a solid, `hydro.strength.laws`; its stress and plastic strain are then the
     first carried fields.  None: a fluid.
+    spall: law by which a solid opens under tension, `hydro.strength.spall`.  None: voids open at
+    the tension of the equation of state.
     Raises BadInput for a grid with a bad cell, for a density or sound speed that is not positive,
     and for an equation of state whose formulas disagree.
     """
@@ -139,6 +142,7 @@ class Block:
         flux: str = DEFAULT_FLUX,
         carried: Sequence[CarriedField] = (),
         strength: StrengthLaw | None = None,
+        spall: SpallLaw | None = None,
     ):
         _check_name(name, "a block")
         _check_name(material or name, f"the material of block {name!r}", forbidden=",")
@@ -171,8 +175,10 @@ class Block:
         self.strength = strength
         self.stress: Stress | None = None
         if strength is not None:
-            carried = add_stress_fields(name, eos, tuple(carried))
-            self.stress = Stress(strength, self.ni, self.nj)
+            carried = add_stress_fields(name, eos, tuple(carried), spall)
+            self.stress = Stress(strength, self.ni, self.nj, spall)
+        elif spall is not None:
+            raise BadInput(f"block {name!r}: a law of spall wants a law of strength besides")
         self._carry(carried)
         self.mixed = self._mix(eos, limiter, flux) if isinstance(eos, Mixture) else None
         self._start_copies: dict[str, np.ndarray] = {}  # separate if a body source acts

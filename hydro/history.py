@@ -65,7 +65,10 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
     first_order = 0
     voided = 0
     emptied = 0
+    broken = None  # by laws of spall, if there are any
     for block in flow.blocks:
+        if block.stress is not None and block.stress.spall is not None:
+            broken = (broken or 0) + block.stress.broken_cells
         sums = block.totals.sums
         first_order += int(sums.first_order)
         if block.kernels.is_first_order:  # all of its faces
@@ -77,6 +80,8 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
         "voided_cells": voided,
         "emptied_cells": emptied,
     }
+    if broken is not None:
+        row["broken_cells"] = broken
     if flow.exchange.contacts:
         row["pulled_pieces"] = sum(contact.pulled for contact in flow.exchange.contacts)
     return row

@@ -11,6 +11,8 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.eos.materials import Material, choose_strength, find_material, make_material
 from shockgrid.hydro.strength.laws import StrengthLaw
+from shockgrid.hydro.strength.laws.base import make_law
+from shockgrid.hydro.strength.spall import SPALL_LAWS, SpallLaw
 from shockgrid.problems.deck import key
 from shockgrid.problems.references.elastic_plastic import Solid, make_solid_at_rest
 
@@ -22,6 +24,20 @@ Strength = key(
     'such as { law = "perfect", shear_modulus = 27.6e9, yield_strength = 0.3e9 }; false: none, it '
     "is a fluid",
 )
+
+
+Spall = key(
+    Table,
+    'law of spall, a table with its parameters, such as { law = "cochran-banner", stress = 1.2e9, '
+    "width = 1e-4 }. If left out: voids open at the material's `strength`",
+)
+
+
+def find_spall(table: Mapping[str, Any]) -> SpallLaw | None:
+    """The law of spall of a deck's table, None for an empty one; BadInput for what makes none."""
+    if not table:
+        return None
+    return make_law("deck: spall", table, SPALL_LAWS, 0.0, "spall")
 
 
 def find_solid(

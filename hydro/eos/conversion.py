@@ -135,6 +135,24 @@ def compute_temperature(eos: EquationOfState, state: np.ndarray, void_energy) ->
     return eos.temperature(pieces, e)
 
 
+def compute_whole_pressure(eos: EquationOfState, state: np.ndarray, void_energy) -> np.ndarray:
+    """Pressures (...) [Pa] that whole material would have of the same density and energy."""
+    return eos.pressure(state[RHO], compute_energy(eos, state, void_energy))
+
+
+def open_voids(
+    eos: EquationOfState, pressure: np.ndarray, state: np.ndarray, void_energy: np.ndarray
+) -> None:
+    """Give cells a `pressure` (...) [Pa] where it is above their own, in place, by voids.
+
+    Density and energy stay.
+    """
+    opened = pressure > state[P]
+    e = compute_energy(eos, state, void_energy)
+    state[P] = np.where(opened, pressure, state[P])
+    void_energy[...] = np.where(opened, e - eos.energy(state[RHO], pressure), void_energy)
+
+
 def compute_conserved(eos: EquationOfState, state: np.ndarray, void_energy=0.0) -> np.ndarray:
     """Density, momentum x, y and total energy per volume (4, ...)."""
     to_conserved = make_conversion(type(eos)).to_conserved

@@ -18,7 +18,13 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.carried.fields import CarriedField
-from shockgrid.hydro.eos.conversion import compute_temperature, has_voids
+from shockgrid.hydro.eos.conversion import (
+    compute_energy,
+    compute_temperature,
+    compute_whole_pressure,
+    has_voids,
+    open_voids,
+)
 from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART
 from shockgrid.hydro.interior.solid import make_solid_arrays
 from shockgrid.hydro.rows import RHO, P
@@ -40,6 +46,7 @@ from shockgrid.hydro.strength.sides import (
     trace_stress,
     trace_stress_moving,
 )
+from shockgrid.hydro.strength.spall.base import SolidCells, SpallLaw
 from shockgrid.regrid.errors import BadInput
 
 STRESS_FIELDS = (
@@ -50,8 +57,21 @@ STRESS_FIELDS = (
 )
 
 
+def strip_ghosts(held: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The arrays of HELD_ARRAYS of a block without the ghosts of its state."""
+    state, *others = held
+    return [state[:, 1:-1, 1:-1], *others]
+
+
+def find_shorter_extent(nodes: np.ndarray) -> np.ndarray:
+    """The shorter distance (ni, nj) [m] between the middles of opposite faces of cells."""
+    along_i = 0.5 * (np.diff(nodes, axis=1)[:, :, 1:] + np.diff(nodes, axis=1)[:, :, :-1])
+    along_j = 0.5 * (np.diff(nodes, axis=2)[:, 1:] + np.diff(nodes, axis=2)[:, :-1])
+    return np.minimum(np.hypot(*along_i), np.hypot(*along_j))
+
+
 def add_stress_fields(
-    block: str, eos: Any, fields: tuple[CarriedField, ...]
+    block: str, eos: Any, fields: tuple[CarriedField, ...], spall: SpallLaw | None = None
 ) -> tuple[CarriedField, ...]:
     """The carried fields of a block of solid: those given, and those of its stress that lack.
 
@@ -66,8 +86,9 @@ def add_stress_fields(
             f"{eos.kind!r} has none"
         )
     fields_by_name = {field.name: field for field in fields}
-    stress_fields = [fields_by_name.pop(field.name, field) for field in STRESS_FIELDS]
-    return (*stress_fields, *fields_by_name.values())
+    wanted = (*STRESS_FIELDS, *(spall.fields if spall is not None else ()))
+    own_fields = [fields_by_name.pop(field.name, field) for field in wanted]
+    return (*own_fields, *fields_by_name.values())
 
 
 def stiffen_wave_law(wave_law: tuple[float, ...], eos: Any, law: StrengthLaw) -> tuple[float, ...]:
@@ -91,8 +112,10 @@ class Stress:
 
     FIRST_FIELD = 0
 
-    def __init__(self, law: StrengthLaw, ni: int, nj: int):
+    def __init__(self, law: StrengthLaw, ni: int, nj: int, spall: SpallLaw | None = None):
         self.law = law
+        self.spall = spall
+        self.broken_cells = 0
         self.arrays = make_solid_arrays(ni, nj)
         self.rates = np.zeros((RATE_ROWS, ni, nj))
         self.sides = np.zeros((SIDE_ROWS, 2 * (ni + nj)))
@@ -100,7 +123,7 @@ class Stress:
     def start(self, block: Any) -> None:
         """Phase 2, when the cells along the sides are gathered: see `start_stress`."""
         held = block.list_starts()
-        shear = self._find_shear(block, held)
+        shear = self._find_shear(block, held, block.get_start("carried"))
         torn = has_voids(held, slice(None), slice(None))
         self.arrays.shear[...] = np.where(torn, 0.0, shear)
         start_stress(
@@ -165,8 +188,54 @@ class Stress:
         )  # fmt: skip
         held = block.list_new()
         laws = self._find_laws(block, held, block.carried_new)
-        shear = self._find_shear(block, held)
+        shear = self._find_shear(block, held, block.carried_new)
+        plastic_strain = block.carried_new[self.FIRST_FIELD + PLASTIC_STRAIN, 1:-1, 1:-1]
+        before = plastic_strain.copy() if self.spall is not None else plastic_strain
         update_stress(block.carried_new, self.rates, laws, shear, tuple(held), dt, rows)
+        if self.spall is not None:
+            self._spall(block, held, plastic_strain - before, dt)
+
+    def _spall(
+        self, block: Any, held: Sequence[np.ndarray], strained: np.ndarray, dt: float
+    ) -> None:
+        """Advance the fields of spall; voids open, and broken cells lose their stress.
+
+        strained (ni, nj): increase of the plastic strain in the step.
+        """
+        assert self.spall is not None
+        rows = slice(block.rows.start, block.rows.stop)
+        state, *others = (array[..., rows, :] for array in strip_ghosts(held))
+        carried = block.carried_new[:, 1:-1, 1:-1][:, rows]
+        stress = carried[self.FIRST_FIELD : self.FIRST_FIELD + PLASTIC_STRAIN]
+        values = carried[self._find_spall_fields()].copy()
+        eos = block.eos
+        rho, p = state[RHO], state[P]
+        temperature = None
+        if self.spall.needs_temperature:
+            temperature = compute_temperature(eos, state, *others)
+        cells = SolidCells(
+            eos=eos,
+            density=rho,
+            pressure=compute_whole_pressure(eos, state, *others),
+            energy=compute_energy(eos, state, *others),
+            sound=eos.sound_speed(rho, p),
+            stress=stress,
+            strained=strained[rows],
+            strain_rate=self.rates[EQUIVALENT][rows],
+            temperature=temperature,
+            extent=find_shorter_extent(block.nodes_new)[rows],
+        )
+        pressure = self.spall.relax(values, cells, dt)
+        open_voids(eos, pressure, state, *others)
+        carried[self._find_spall_fields()] = values
+        broken = self.spall.find_broken(values)
+        self.broken_cells = int(np.count_nonzero(broken))
+        stress[:, broken | (others[0] != 0.0)] = 0.0
+
+    def _find_spall_fields(self) -> slice:
+        """Where the fields of spall are among the carried ones: after those of the stress."""
+        first = self.FIRST_FIELD + len(STRESS_FIELDS)
+        return slice(first, first + len(self.spall.fields) if self.spall else first)
 
     def _list_state(self, block: Any, held: Sequence[np.ndarray]) -> tuple:
         """Density, pressure and, where the law asks for it, temperature of cells, (ni, nj) each.
@@ -180,10 +249,16 @@ class Stress:
             temperature = compute_temperature(block.eos, inside, *void_arrays)
         return inside[RHO], inside[P], temperature
 
-    def _find_shear(self, block: Any, held: Sequence[np.ndarray]) -> np.ndarray:
-        """Shear modulus (ni, nj) [Pa] of the law; no number where there is no state."""
+    def _find_shear(
+        self, block: Any, held: Sequence[np.ndarray], carried: np.ndarray
+    ) -> np.ndarray:
+        """Shear modulus (ni, nj) [Pa] of the law; no number where there is no state, and 0 in
+        broken cells."""
         with np.errstate(all="ignore"):
             shear = self.law.shear_modulus(*self._list_state(block, held))
+        if self.spall is not None:
+            broken = self.spall.find_broken(carried[self._find_spall_fields(), 1:-1, 1:-1])
+            shear = np.where(broken, 0.0, shear)
         return np.ascontiguousarray(shear)
 
     def _find_laws(

@@ -39,6 +39,7 @@ ROOMS = (
     ("hydro.interior", "hydro.convection"),
     ("hydro.perimeter",),
     ("hydro.kernels", "hydro.totals", "hydro.carried"),
+    ("hydro.strength.spall",),
     ("hydro.strength",),
     ("hydro.mixture",),
     ("hydro.block",),

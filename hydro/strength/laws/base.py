@@ -72,18 +72,24 @@ class StrengthLaw:
         return np.zeros(np.shape(density))
 
 
-def make_law(where: str, table: Mapping[str, Any], laws: Mapping[str, type], rho0: float) -> Any:
+def make_law(
+    where: str,
+    table: Mapping[str, Any],
+    laws: Mapping[str, type],
+    rho0: float,
+    subject: str = "strength",
+) -> Any:
     """The law of a table such as {law = "perfect", shear_modulus = ..., yield_strength = ...}.
 
     where: begins the sentence of a BadInput; laws: those known, by kind; rho0: density at rest of
-    the material [kg/m³].  Raises BadInput for a law that is not known, and for parameters that it
-    lacks or does not have.
+    the material [kg/m³]; subject: what the laws are of.  Raises BadInput for a law that is not
+    known, and for parameters that it lacks or does not have.
     """
     numbers = dict(table)
     kind = numbers.pop("law", None)
     if kind not in laws:
         known = ", ".join(laws)
-        raise BadInput(f"{where}: law is {kind!r}; the laws of strength are {known}")
+        raise BadInput(f"{where}: law is {kind!r}; the laws of {subject} are {known}")
     law_class = laws[kind]
     parameters = {law_class.keys.get(field.name, field.name): field for field in fields(law_class)}
     for name in numbers:

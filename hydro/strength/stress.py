@@ -139,7 +139,7 @@ class Stress:
         rows = block.rows.start, block.rows.stop
         values = block.get_start("carried")
         fill_stress_ghosts(
-            arrays.shear, block.plan.moving, self.FIRST_FIELD, self.sides, block.rim.rows
+            arrays.shear, block.plan.flowing_spans, self.FIRST_FIELD, self.sides, block.rim.rows
         )
         transport.predict(block, half_dt)
         make_predict_rates(block.geometry)(
@@ -159,7 +159,7 @@ class Stress:
         """Phase 2, at the end: the traces at faces that go with the flow."""
         transport = block.transport
         trace_stress_moving(
-            transport.slopes, transport.centres, self.arrays.shear, block.plan.moving,
+            transport.slopes, transport.centres, self.arrays.shear, block.plan.flowing_spans,
             self.FIRST_FIELD, block.rim.rows,
         )  # fmt: skip
 

@@ -45,6 +45,7 @@ SLOPE_PARTS = 3
 # kept sharp
 SQUARED_SOUND, HLL_SWITCH, ACOUSTIC_PART, SHARP = range(4)
 MARK_ROWS = 4
+ROUND_OFF_FRACTION = 1e-9  # of a material, less than nothing of it, that is no mistake
 # volume fraction of either material from which on a cell has both
 LEAST_SHARP_FRACTION = 1e-6
 
@@ -111,12 +112,16 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
     def find_part(cell, gradients, corners, lowest, highest):
         """The part of the slopes of a cell's materials that leaves none of them negative.
 
-        Nor, at any corner, a volume fraction beyond least..most.
+        Nor, at any corner, a volume fraction beyond lowest..highest.
         """
         (first_x, first_y), (second_x, second_y), (volume_x, volume_y) = gradients
         a, b, c, d = corners
         x = 0.25 * ((a[0] + c[0]) + (b[0] + d[0]))
         y = 0.25 * ((a[1] + c[1]) + (b[1] + d[1]))
+        # no less than nothing, but for round-off
+        none = -ROUND_OFF_FRACTION * (cell[PART_FIRST] + cell[PART_SECOND])
+        least_first = min(none, cell[PART_FIRST])
+        least_second = min(none, cell[PART_SECOND])
         fraction = 1.0
         for corner in corners:
             way_x = corner[0] - x
@@ -124,9 +129,9 @@ def make_fill_slopes(eos_class, limiter: str, flux: str):
             change = volume_x * way_x + volume_y * way_y
             fraction = min(fraction, bound(change, cell[VOLUME], lowest, highest))
             change = first_x * way_x + first_y * way_y
-            fraction = min(fraction, bound(change, cell[PART_FIRST], 0.0, 1e300))
+            fraction = min(fraction, bound(change, cell[PART_FIRST], least_first, 1e300))
             change = second_x * way_x + second_y * way_y
-            fraction = min(fraction, bound(change, cell[PART_SECOND], 0.0, 1e300))
+            fraction = min(fraction, bound(change, cell[PART_SECOND], least_second, 1e300))
         return fraction
 
     @inlined

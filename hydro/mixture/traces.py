@@ -10,6 +10,7 @@ from shockgrid.hydro.mixture.slopes import (
     PART_FIRST,
     PART_SECOND,
     PRESSURE,
+    ROUND_OFF_FRACTION,
     SLOPE_X,
     SLOPE_Y,
     SPEED_X,
@@ -21,8 +22,6 @@ from shockgrid.hydro.mixture.slopes import (
 from shockgrid.hydro.perimeter.faces import find_corners
 from shockgrid.hydro.rows import RHO, P, U, V
 from shockgrid.regrid.jit import compiled_once, inlined
-
-ROUND_OFF_FRACTION = 1e-9  # that a fraction at a face may be below 0 or above 1
 
 
 @inlined

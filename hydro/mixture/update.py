@@ -99,14 +99,14 @@ def make_exchange(eos_class):
     find_parts = eos_class.parts_part
 
     @compiled_once(allocates=False)
-    def exchange(flux, side, fraction, parameters):
+    def exchange(flux, state, rho, mixed_parameters, fraction):
         """A flux that brings the volume `fraction` of the first material instead of its own.
 
-        Both keep their densities, pressure and velocity: those of `side`, where it comes from.
+        state: at the face where it comes from, whose pressure and velocity both keep.  rho,
+        mixed_parameters: density and parameters of the cell, where both have their densities.
         """
         mass, x, y, energy, first, brought, passing = flux
-        (rho, u, v, p, _, _), (mass_fraction, volume) = side
-        mixed_parameters = add_fractions(parameters, mass_fraction, volume)
+        _, u, v, p, _, _ = state
         rho_first, rho_second, held_first, held_second = find_parts(rho, p, mixed_parameters)
         excess = passing * fraction - brought
         more_mass = excess * (rho_first - rho_second)
@@ -207,7 +207,8 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
         leaving = find_leaving(state, grids, i, j, dt)
         fraction = bound_by_rest(wanted, here, after, extremes, leaving)
         fraction = sharpness * fraction + (1.0 - sharpness) * side[1][1]
-        return exchange(flux, side, fraction, parameters)
+        mixed_parameters = add_fractions(parameters, carried[MASS_FRACTION, a, b], here)
+        return exchange(flux, side[0], state[RHO, a, b], mixed_parameters, fraction)
 
     @compiled_once(allocates=False)
     def pass_face(cells, cell_before, cell_after, place, dt, parameters):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from builders import check_budget, check_restarts, march_measured
+from shockgrid.problems.initial_states import Fluid
 from shockgrid.problems.interface_instability.deck import InterfaceDeck, LineMotion
 from shockgrid.problems.interface_instability.line import Mode
 from shockgrid.problems.interface_instability.problem import InterfaceInstability
@@ -49,6 +50,15 @@ def test_place_width_and_modes_go_on_over_the_handover():
         assert abs(history[name][row] - expected) < 0.004 * amplitude, name
     profile = history["integral_width"][row]
     assert 1.2 * amplitude < profile < 2.0 * amplitude, "of a cosine 1.6 times"
+
+
+def test_no_step_fails_where_a_shock_comes_back_through_both_materials():
+    """Round-off of a material that is not there is no lack of it."""
+    gases = {"first": Fluid(gamma=1.4, rho=1.0), "second": Fluid(gamma=1.093, rho=5.1)}
+    tube = {"start": "captured", "mach": 1.2, "lengths": (4.0, 1.5), "kct_end": 25.0}
+    history = march_problem(make_problem(cells=24, modes=[Mode(ka0=0.2)], **tube, **gases))
+    assert np.nanmax(history["retries"]) == 0
+    assert np.nanmax(history["first_order_faces"]) == 0
 
 
 def test_restarts_go_on_with_the_same_bits():

@@ -25,6 +25,9 @@ def make_held(ni: int, nj: int) -> dict[str, np.ndarray]:
     return {"state": np.zeros((STATE_ROWS, ni + 2, nj + 2)), "void_energy": np.zeros((ni, nj))}
 
 
+# index of the node at an end of a line: 0 is its first end, 1 its last
+END_INDEX = (0, -1)
+
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
 

@@ -204,7 +204,7 @@ class Simulation:
         self.meetings = Meetings(blocks, links, self.motion, self.geometry, self._void_fill)
         self.tension = SurfaceTension(blocks, self.exchange, self.motion)
         if self._mesh != "fixed":
-            self._overlaps.watch(everything=callable(self._mesh))
+            self._overlaps.watch(all_segments=callable(self._mesh))
         self._body_source = BodySource(self._shared, self._source)
         self.exchange.divide_contacts()
 

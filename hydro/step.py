@@ -21,7 +21,7 @@ from shockgrid.hydro.ledger import Ledger
 from shockgrid.hydro.links import Exchange
 from shockgrid.hydro.motion import sides as on_sides
 from shockgrid.hydro.motion.grid_motion import GridMotion
-from shockgrid.hydro.motion.sides import Sides, Span
+from shockgrid.hydro.motion.sides import Sides, StepTime
 from shockgrid.hydro.motion.tension import SurfaceTension
 from shockgrid.hydro.ranks.blocks import Blocks
 from shockgrid.hydro.small_cells import SmallCells
@@ -33,14 +33,14 @@ MOST_RETRIES = 12
 # Phase 4, how the nodes along the sides of all blocks move: passes in their order, what each does,
 # and why it stands there.  They are in `hydro.motion.sides`.
 # Each is left out where the list of this name is empty.
-SIDE_PASSES: tuple[tuple[Callable[[Sides, Span], None], str, str], ...] = (
+SIDE_PASSES: tuple[tuple[Callable[[Sides, StepTime], None], str, str], ...] = (
     (on_sides.space_contact_points, "followers", "spacing around contact points, by old lengths"),
     (on_sides.turn_mirrors, "turning", "walls at line ends as they lie, where damping mirrors"),
     (on_sides.damp_short_waves, "damped", "additional velocities of lines and their ends"),
     (on_sides.move_key_nodes, "key_nodes", "ends of lines first, by all faces that meet there"),
     (on_sides.move_lines, "moving", "between their ends; along themselves if nothing cuts them"),
     (on_sides.slide_joints, "joints", "ends inside a contact, along its moved lines"),
-    (on_sides.move_carried_seams, "carried_seams", "their ends go with contacts, which have moved"),
+    (on_sides.move_tied_seams, "tied_seams", "their ends go with contacts, which have moved"),
     (on_sides.lay_followers, "followers", "on their leaders' moved lines; cuts free lines"),
     (on_sides.spread_lines, "lines", "those that were cut, and all that only go with their ends"),
     (on_sides.give_lines, "links", "followers receive the leaders' lines, final but for corners"),
@@ -227,7 +227,7 @@ def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
     """Phase 4; the shorter step, if surfaces come to touch within this one."""
     with flow.watch("regrid"):
         # 4 nodes along the sides moved; surfaces that have come to touch laid on each other
-        move_sides(flow.motion, Span(flow.clock.t, dt, fraction))
+        move_sides(flow.motion, StepTime(flow.clock.t, dt, fraction))
         shorter = flow.meetings.meet(dt, dt / fraction)
     return None if shorter is None else Touch(shorter)
 
@@ -246,14 +246,14 @@ def update_states(flow: Flow, dt: float) -> None:
         flow.small_cells.redistribute_states(flow.clock.cfl / dt, dt)
 
 
-def move_sides(motion: GridMotion, span: Span) -> None:
+def move_sides(motion: GridMotion, step: StepTime) -> None:
     """Phase 4; a mesh that is given has its sides with all its other nodes."""
     if motion.mesh != "regrid":
-        motion.follow_mesh(span)
+        motion.follow_mesh(step)
         return
     for move, moved, _ in SIDE_PASSES:
         if getattr(motion.sides, moved):
-            move(motion.sides, span)
+            move(motion.sides, step)
 
 
 def find_failure(flow: Flow) -> RunFailure | None:

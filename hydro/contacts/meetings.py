@@ -257,7 +257,7 @@ class Meetings:
         if not shifts[:, 0].any():
             return
         for (asked, *way), key_node in zip(shifts, surface.ends, strict=True):
-            if not asked or key_node is None or key_node.given or key_node.carried:
+            if not asked or key_node is None or key_node.given or key_node.is_tied:
                 continue
             key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
             if self.geometry.curved:

@@ -338,5 +338,5 @@ class Bodies:
 
 def _may_move(key_node: KeyNode) -> bool:
     """Whether free surfaces alone rule the node."""
-    held = key_node.given or key_node.carried or key_node.constraining_faces
+    held = key_node.given or key_node.is_tied or key_node.constraining_faces
     return not held and bool(key_node.flowing)

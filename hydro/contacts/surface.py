@@ -191,7 +191,7 @@ class Surface:
     def flow_along(self) -> None:
         """Let material flow along the line with its nodes, where they are respaced round bends."""
         if self.moving_line.role is Role.ON_BODY:
-            speeds = self.moving_line.beside_contact
+            speeds = self.moving_line.extra_velocity
             flow_along(self.block.rim.rows, speeds, self.segment.first)
 
     def press(self, pressure: float, first: int = 0, last: int | None = None) -> None:

@@ -37,6 +37,7 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import Segment
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Line
+from shockgrid.hydro.rows import END_INDEX
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.hydro.sliding.pieces import find_last_crossing, project_in_order
 from shockgrid.regrid.curves import compute_arc_lengths, meeting_laws
@@ -68,26 +69,31 @@ class Joint:
 
     def slide(self, relax: float) -> None:
         """Shift the node's new position by the part `relax` of its way, along the moved contact."""
-        moved = []
+        lines_from_joint = []
         for line, end in zip(self.lines, self.ends, strict=True):
             nodes = line.segment.line(line.segment.block.nodes_new)
-            moved.append(nodes if end == 0 else nodes[:, ::-1])  # from the joint on
-        lengths = [self._measure(nodes) for nodes in moved]
-        way = relax * (self.share * sum(lengths) - lengths[0])
-        near = min(float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in moved)
-        way = min(max(way, -MOST_JOINT_SLIDE * relax * near), MOST_JOINT_SLIDE * relax * near)
-        before = moved[0][:, JOINT_REACH_NODES:0:-1]
-        after = moved[1][:, 1 : JOINT_REACH_NODES + 1]
-        position = moved[0][:, 0].copy()
+            lines_from_joint.append(nodes if end == 0 else nodes[:, ::-1])  # from the joint on
+        lengths = [self._measure(nodes) for nodes in lines_from_joint]
+        distance = relax * (self.share * sum(lengths) - lengths[0])
+        shorter_spacing = min(
+            float(np.hypot(*(nodes[:, 1] - nodes[:, 0]))) for nodes in lines_from_joint
+        )
+        distance = min(
+            max(distance, -MOST_JOINT_SLIDE * relax * shorter_spacing),
+            MOST_JOINT_SLIDE * relax * shorter_spacing,
+        )
+        before = lines_from_joint[0][:, JOINT_REACH_NODES:0:-1]
+        after = lines_from_joint[1][:, 1 : JOINT_REACH_NODES + 1]
+        position = lines_from_joint[0][:, 0].copy()
         curve = np.concatenate([before, position[:, None], after], axis=1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
         from scipy.interpolate import CubicSpline  # slow to load
 
         spline = CubicSpline(arc, curve, axis=1)
-        self.node.shift(spline(arc[before.shape[1]] + way) - position)
+        self.node.shift(spline(arc[before.shape[1]] + distance) - position)
 
 
-class CarriedSeam:
+class TiedSeam:
     """A seam between two contacts (leading segments), each its whole side.
 
     Every node of the seam goes with the two points of the contacts that it had beside it at first,
@@ -95,40 +101,49 @@ class CarriedSeam:
     them.  Raises BadInput where there are no such points.
     """
 
-    def __init__(self, seam: Segment, one: Segment, other: Segment):
+    def __init__(self, seam: Segment, contact: Segment, other_contact: Segment):
         self.seam = seam
-        self.contacts = (one, other)
-        here, a, b = (segment.line(segment.block.nodes) for segment in (seam, one, other))
-        way = b.mean(axis=1) - a.mean(axis=1)
-        heights = [way[0] * line[1] - way[1] * line[0] for line in (here, a, b)]
+        self.contacts = (contact, other_contact)
+        seam_nodes, contact_nodes, other_nodes = (
+            segment.line(segment.block.nodes) for segment in (seam, contact, other_contact)
+        )
+        axis = other_nodes.mean(axis=1) - contact_nodes.mean(axis=1)
+        heights = [
+            axis[0] * line[1] - axis[1] * line[0]
+            for line in (seam_nodes, contact_nodes, other_nodes)
+        ]
         self.positions = []
         points = []
-        for line, height in zip((a, b), heights[1:], strict=True):
+        for line, height in zip((contact_nodes, other_nodes), heights[1:], strict=True):
             order = 1 if height[-1] > height[0] else -1
-            least, most = sorted((height[0], height[-1]))
-            slack = 1e-9 * (most - least)
+            lowest, highest = sorted((height[0], height[-1]))
+            slack = 1e-9 * (highest - lowest)
             if (order * np.diff(height) <= 0.0).any() or not (
-                (heights[0] >= least - slack) & (heights[0] <= most + slack)
+                (heights[0] >= lowest - slack) & (heights[0] <= highest + slack)
             ).all():
-                raise BadInput(f"{seam} cannot move with {one} and {other}: it is not between them")
+                raise BadInput(
+                    f"{seam} cannot move with {contact} and {other_contact}: it is not between them"
+                )
             count = np.arange(height.size)
-            at = np.interp(heights[0], height[::order], count[::order])
-            self.positions.append(at)
-            points.append(np.array([np.interp(at, count, q) for q in line]))
-        a, b = points
-        self.part = ((here - a) * (b - a)).sum(axis=0) / ((b - a) ** 2).sum(axis=0)
+            positions = np.interp(heights[0], height[::order], count[::order])
+            self.positions.append(positions)
+            points.append(np.array([np.interp(positions, count, q) for q in line]))
+        contact_nodes, other_nodes = points
+        self.fraction = ((seam_nodes - contact_nodes) * (other_nodes - contact_nodes)).sum(
+            axis=0
+        ) / ((other_nodes - contact_nodes) ** 2).sum(axis=0)
         self.ends: list[KeyNode] = []
 
     def compute_displacement(self) -> np.ndarray:
         """Displacements (2, n + 1) of the seam's nodes, the contacts' new nodes being known."""
         total = 0.0
-        for contact, at, weight in zip(
-            self.contacts, self.positions, (1.0 - self.part, self.part), strict=True
+        for contact, positions, weight in zip(
+            self.contacts, self.positions, (1.0 - self.fraction, self.fraction), strict=True
         ):
             block = contact.block
             step = contact.line(block.nodes_new) - contact.line(block.nodes)
             count = np.arange(step.shape[1])
-            total = total + weight * np.array([np.interp(at, count, q) for q in step])
+            total = total + weight * np.array([np.interp(positions, count, q) for q in step])
         return total
 
     def move_ends(self) -> None:
@@ -168,7 +183,7 @@ class FollowerMotion:
         for end in (0, 1):
             node = int(self.contact.fixed[end])
             if node < 0:
-                ends[end] = self._find_contact_point(end, line, old[:, -end], arc)
+                ends[end] = self._find_contact_point(end, line, old[:, END_INDEX[end]], arc)
                 node = int(self.contact.fixed_new[end])
             if node >= 0:
                 ends[end] = arc[node]
@@ -183,13 +198,13 @@ class FollowerMotion:
         points = np.array([np.interp(wanted, arc, row) for row in line])
         # the key nodes at its ends go there
         shifts = points[:, [0, -1]] - self.contact.follower.new_ends()
-        one, other = self.key_nodes
-        one.shift(shifts[:, 0])
-        if other is not one:
-            other.shift(shifts[:, 1])
+        first_node, last_node = self.key_nodes
+        first_node.shift(shifts[:, 0])
+        if last_node is not first_node:
+            last_node.shift(shifts[:, 1])
         self.contact.follower.write_line(points)
 
-    def share_nodes(self) -> None:
+    def space_around_contact_points(self) -> None:
         """Spacings around contact points, from the old lines' lengths.
 
         The contact and the free line that goes on from it have the same step where they meet; the
@@ -203,32 +218,37 @@ class FollowerMotion:
             if free is None:
                 continue
             segment = free.segment
-            other = np.ascontiguousarray(segment.line(segment.block.nodes))
-            other_length = float(compute_arc_lengths(other)[-1])
-            spacing, other_spacing = meeting_laws(
-                (line.shape[1], other.shape[1]),
-                (length, other_length),
+            free_nodes = np.ascontiguousarray(segment.line(segment.block.nodes))
+            free_length = float(compute_arc_lengths(free_nodes)[-1])
+            contact_spacing, free_spacing = meeting_laws(
+                (line.shape[1], free_nodes.shape[1]),
+                (length, free_length),
                 self.contact.refinement,
             )
-            self.spacing = spacing if end == 1 else (1.0 - spacing)[::-1]
-            own = self.contact.follower.segments[-end]
+            self.spacing = contact_spacing if end == 1 else (1.0 - contact_spacing)[::-1]
+            end_segment = self.contact.follower.segments[END_INDEX[end]]
             # does the contact come after?
-            flip = self.contact.follower.reversed[-end] != (end == 0)
-            first = spacing
-            second = other_spacing
-            if flip:
-                first = (1.0 - other_spacing)[::-1]
-                second = (1.0 - spacing)[::-1]
-            free.set_spacing(second if not flip else first)
+            contact_comes_second = self.contact.follower.reversed[END_INDEX[end]] != (end == 0)
+            first_spacing = contact_spacing
+            second_spacing = free_spacing
+            if contact_comes_second:
+                first_spacing = (1.0 - free_spacing)[::-1]
+                second_spacing = (1.0 - contact_spacing)[::-1]
+            free.set_spacing(second_spacing if not contact_comes_second else first_spacing)
             opposite = self.opposites[end]
-            if opposite is not None and first.size + second.size == opposite.spacing.size + 1:
-                across = opposite.segment.line(own.block.nodes)
+            if (
+                opposite is not None
+                and first_spacing.size + second_spacing.size == opposite.spacing.size + 1
+            ):
+                across = opposite.segment.line(end_segment.block.nodes)
                 chord = across[:, -1] - across[:, 0]
-                point = line[:, -end] - across[:, 0]
-                part = float((point @ chord) / (chord @ chord))
-                part = min(max(part, OPPOSITE_PART[0]), OPPOSITE_PART[1])
+                point = line[:, END_INDEX[end]] - across[:, 0]
+                fraction = float((point @ chord) / (chord @ chord))
+                fraction = min(max(fraction, OPPOSITE_PART[0]), OPPOSITE_PART[1])
                 opposite.set_spacing(
-                    np.concatenate((part * first, part + (1.0 - part) * second[1:]))
+                    np.concatenate(
+                        (fraction * first_spacing, fraction + (1.0 - fraction) * second_spacing[1:])
+                    )
                 )
 
     def _find_contact_point(self, end, line, start, arc) -> float:
@@ -238,29 +258,29 @@ class FollowerMotion:
         # a free surface that goes on from the point: where it crosses the leader's line
         if free is not None:
             at_start = self.starts[end]
-            away = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
-            k, _, face, part = find_last_crossing(away, line)
-            if k >= 0:
-                position = arc[face] + part * (arc[face + 1] - arc[face])
-                point = line[:, face] + part * (line[:, face + 1] - line[:, face])
-                free.cut(at_start, k, point)
+            from_free_end = np.ascontiguousarray(free.moved if at_start else free.moved[:, ::-1])
+            free_face, _, face, fraction = find_last_crossing(from_free_end, line)
+            if free_face >= 0:
+                position = arc[face] + fraction * (arc[face + 1] - arc[face])
+                point = line[:, face] + fraction * (line[:, face + 1] - line[:, face])
+                free.shorten_to(at_start, free_face, point)
         # none crosses: the point nearest to the moved end
         if position is None:
-            moved_end = self.contact.follower.line(new=True)[:, [-end]]
-            found = np.empty(1)
-            project_in_order(line, moved_end, found)
-            face = min(int(found[0]), line.shape[1] - 2)
-            position = arc[face] + (found[0] - face) * (arc[face + 1] - arc[face])
+            moved_end = self.contact.follower.line(new=True)[:, [END_INDEX[end]]]
+            nearest = np.empty(1)
+            project_in_order(line, moved_end, nearest)
+            face = min(int(nearest[0]), line.shape[1] - 2)
+            position = arc[face] + (nearest[0] - face) * (arc[face + 1] - arc[face])
         # where the point was, on the new line
-        was = np.empty(1)
-        project_in_order(line, np.reshape(start, (2, 1)), was)
-        face = min(int(was[0]), line.shape[1] - 2)
-        before = arc[face] + (was[0] - face) * (arc[face + 1] - arc[face])
+        old_position = np.empty(1)
+        project_in_order(line, np.reshape(start, (2, 1)), old_position)
+        face = min(int(old_position[0]), line.shape[1] - 2)
+        before = arc[face] + (old_position[0] - face) * (arc[face + 1] - arc[face])
         # close to the end of the leader's line it is caught by its last node
-        goal, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
+        end_arc, node = (arc[-1], line.shape[1] - 1) if end == 1 else (arc[0], 0)
         step = position - before if end == 1 else before - position
-        left = abs(goal - position)
-        if step > 0.0 and left < ARRIVAL_STEPS * step:
+        distance_left = abs(end_arc - position)
+        if step > 0.0 and distance_left < ARRIVAL_STEPS * step:
             self.contact.fixed_new[end] = node
         return float(position)
 
@@ -313,12 +333,12 @@ class CornerGuard:
         for _ in range(MOST_CORNER_ROUNDS if self.followers else 1):
             moved = 0.0
             for member in self.corners:
-                way = compute_way(*find_corner(*member))
-                if self.narrow > 0.0 and not way.any():
-                    way = compute_way_in(*find_corner(*member), self.narrow)
-                if way.any():
-                    self.node.shift(way)
-                    moved += float(np.hypot(*way))
+                displacement = compute_straightening(*find_corner(*member))
+                if self.narrow > 0.0 and not displacement.any():
+                    displacement = compute_widening(*find_corner(*member), self.narrow)
+                if displacement.any():
+                    self.node.shift(displacement)
+                    moved += float(np.hypot(*displacement))
             if moved == 0.0:
                 break
             for follower in self.followers:
@@ -329,7 +349,9 @@ class CornerGuard:
         return total
 
 
-def compute_way(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def compute_straightening(
+    position: np.ndarray, before: np.ndarray, after: np.ndarray
+) -> np.ndarray:
     """Way (2,) that takes a corner at `position` back to a straight angle; zero if narrower.
 
     `before`, `after`: its neighbours along the sides, (2,), counter-clockwise round the cell.
@@ -337,14 +359,14 @@ def compute_way(position: np.ndarray, before: np.ndarray, after: np.ndarray) -> 
     chord = after - before
     length = float(np.hypot(*chord))
     away = position - before
-    part = float(away @ chord) / length if length > 0.0 else 0.0
-    if not 0.0 < part < length:
+    along = float(away @ chord) / length if length > 0.0 else 0.0
+    if not 0.0 < along < length:
         return np.zeros(2)
     outwards = np.array([chord[1], -chord[0]]) / length
     return max(-float(away @ outwards), 0.0) * outwards
 
 
-def compute_way_in(
+def compute_widening(
     position: np.ndarray, before: np.ndarray, after: np.ndarray, narrow: float
 ) -> np.ndarray:
     """Way (2,) into a corner of an angle [rad] below `narrow`, until it is as wide; else zero."""
@@ -378,7 +400,7 @@ def find_corner(
 
 def _is_free(node: KeyNode, followers: Sequence[FollowerMotion]) -> bool:
     """Whether links and free surfaces alone rule the node, and it is laid on no other's line."""
-    if node.given or node.constraining_faces or node.carried or not node.flowing:
+    if node.given or node.constraining_faces or node.is_tied or not node.flowing:
         return False
     for segment, face in node.ends:
         if segment.is_follower:
@@ -388,7 +410,7 @@ def _is_free(node: KeyNode, followers: Sequence[FollowerMotion]) -> bool:
                 for end, follower_end in enumerate(follower.contact.follower.ends())
             ):
                 return False
-        elif segment.kind not in ("sliding", "free-surface") and not segment.linked:
+        elif not segment.is_free and not segment.linked:
             return False
     return True
 
@@ -400,7 +422,7 @@ def _is_fixed_at(follower: FollowerMotion, end: int, nodes: list[KeyNode]) -> bo
     if contact.fixed[end] < 0:
         return False
     leader_end = contact.leader.ends()[0 if contact.fixed[end] == 0 else 1]
-    return any(leader_end == other for node in nodes for other in node.ends)
+    return any(leader_end == node_end for node in nodes for node_end in node.ends)
 
 
 def _is_corner(block: Block, i: int, j: int) -> bool:

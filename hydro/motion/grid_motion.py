@@ -15,7 +15,7 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.links import Exchange
 from shockgrid.hydro.motion.line import LineRule
-from shockgrid.hydro.motion.sides import Sides, Span
+from shockgrid.hydro.motion.sides import Sides, StepTime
 from shockgrid.hydro.ranks.blocks import Blocks
 from shockgrid.hydro.sliding.polygons import LEAST_VOLUME_LEFT, make_find_crushed
 from shockgrid.regrid.errors import BadInput, Place, RegridFailure, RunFailure
@@ -95,11 +95,11 @@ class GridMotion:
                 "wall; here no side does, so take 'given'"
             )
 
-    def follow_mesh(self, span: Span) -> None:
+    def follow_mesh(self, step: StepTime) -> None:
         """Fill all new nodes of a prescribed mesh; RegridFailure for a motion that tangles."""
         for block in (self.blocks[number] for number in self.blocks.own):
             if callable(self.mesh):
-                block.nodes_new[...] = self.mesh(block.name, span.t + span.dt)
+                block.nodes_new[...] = self.mesh(block.name, step.t + step.dt)
                 self._check_mesh(block)
             elif self.quality is None:  # else both arrays hold the fixed grid already
                 block.nodes_new[...] = block.nodes
@@ -107,12 +107,12 @@ class GridMotion:
     @staticmethod
     def _check_mesh(block: Block) -> None:
         """The grid of a prescribed motion is convex; RegridFailure if not."""
-        bad = find_bad_cells(block.nodes_new)
-        if len(bad):
-            i, j = (int(index) for index in bad[0])
+        bad_cells = find_bad_cells(block.nodes_new)
+        if len(bad_cells):
+            i, j = (int(index) for index in bad_cells[0])
             raise RegridFailure(
-                f"mesh motion: block {block.name!r}: {say_not_convex(len(bad))}, the first is "
-                f"i={i}, j={j}",
+                f"mesh motion: block {block.name!r}: {say_not_convex(len(bad_cells))}, the first "
+                f"is i={i}, j={j}",
                 cause="mesh-law",
                 place=Place(block.name, (i, j)),
             )
@@ -121,11 +121,11 @@ class GridMotion:
         """Grids of a prescribed motion agree on linked sides; RegridFailure if not."""
         for link in self.exchange.links:
             line = link.leader.line(link.leader.block.nodes_new)
-            other = link.follower.line(link.follower.block.nodes_new)
-            miss = np.abs(link.arrange_for_follower(line) - other).max()
-            if miss > 1e-12 * np.ptp(line, axis=1).max():
+            follower_line = link.follower.line(link.follower.block.nodes_new)
+            gap = np.abs(link.arrange_for_follower(line) - follower_line).max()
+            if gap > 1e-12 * np.ptp(line, axis=1).max():
                 raise RegridFailure(
-                    f"mesh motion: {link.leader} and {link.follower} are {miss:.1e} m apart",
+                    f"mesh motion: {link.leader} and {link.follower} are {gap:.1e} m apart",
                     cause="mesh-law",
                     place=Place(link.leader.block.name),
                 )
@@ -144,13 +144,13 @@ class GridMotion:
             number, failure = self._regrid_own(fraction)
         rows = []
         before = self.quality
-        for own in self.blocks.own if failure is None else ():
-            report = self.reports[own] if self.mesh == "regrid" else None
-            known = report.quality if report is not None and not self._limited[own] else None
+        for own_number in self.blocks.own if failure is None else ():
+            report = self.reports[own_number] if self.mesh == "regrid" else None
+            known = report.quality if report is not None and not self._limited[own_number] else None
             if self.mesh == "fixed" and before is not None:
-                known = before[own]
-            known = known or measure_worst(self.blocks[own].nodes_new)
-            rows += [(*known, *self._count(own))]
+                known = before[own_number]
+            known = known or measure_worst(self.blocks[own_number].nodes_new)
+            rows += [(*known, *self._count(own_number))]
         self.quality = []
         self.counts = []
         for row in self.blocks.exchange_nodes(rows, number, failure):
@@ -161,21 +161,23 @@ class GridMotion:
 
     def _regrid_own(self, fraction: float) -> tuple[int, RunFailure | None]:
         """Regrid the blocks that are here; the first failure, and its place in the order of all."""
-        own = self.blocks.own
+        own_numbers = self.blocks.own
         number = 0
         if self.mesh == "regrid":
             try:
-                self.blocks.workers.run(lambda n: self._regrid_block(own[n], fraction), len(own))
-            except RegridFailure as found:
-                return self._find_number(found), found
+                self.blocks.workers.run(
+                    lambda n: self._regrid_block(own_numbers[n], fraction), len(own_numbers)
+                )
+            except RegridFailure as own_failure:
+                return self._find_number(own_failure), own_failure
         try:
             for contact in self.exchange.contacts:
                 contact.measure_new_polygons()
-            for number in own if self._has_followers else ():
+            for number in own_numbers if self._has_followers else ():
                 if self.blocks[number].is_follower:
                     self._spare_polygons(number, MOST_EXCESS * min(1.0, fraction))
-        except RegridFailure as found:
-            return len(self.blocks) + number, found
+        except RegridFailure as own_failure:
+            return len(self.blocks) + number, own_failure
         return 0, None
 
     def _count(self, number: int) -> tuple[float, ...]:
@@ -200,14 +202,14 @@ class GridMotion:
         block = self.blocks[number]
         regridder = self.regridders[number]
         self._limited[number] = 0
-        aware = self.flow_aware[number]
-        if aware is not None and aware.sees_flow:
-            aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
-        more = (block.compute_sound_speed(block.start),) if self.cost_aware[number] else ()
+        flow_aware = self.flow_aware[number]
+        if flow_aware is not None and flow_aware.sees_flow:
+            flow_aware.take_step(block.compute_fields(block.start), min(1.0, fraction))
+        sound_speeds = (block.compute_sound_speed(block.start),) if self.cost_aware[number] else ()
         try:
             result = call_regridder(
-                regridder, block.nodes, block.nodes_new, *more, where=f"block {block.name!r}",
-                in_place=True,
+                regridder, block.nodes, block.nodes_new, *sound_speeds,
+                where=f"block {block.name!r}", in_place=True,
             )  # fmt: skip
         except RegridFailure as failure:
             failure.block = block.name
@@ -215,15 +217,17 @@ class GridMotion:
                 failure.cause = "seam-crossed"
             raise
         nodes = result.nodes
-        most = MOST_EXCESS * min(1.0, fraction)
+        largest_motion = MOST_EXCESS * min(1.0, fraction)
         strayed = result.report.strayed
-        if strayed is None or strayed > most:
-            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, nodes, most)
+        if strayed is None or strayed > largest_motion:
+            nodes, self._limited[number] = self.limiters[number].limit(
+                block.nodes, nodes, largest_motion
+            )
         if nodes is not block.nodes_new:
             block.nodes_new[...] = nodes
         self.reports[number] = result.report
 
-    def _spare_polygons(self, number: int, most: float) -> None:
+    def _spare_polygons(self, number: int, largest_motion: float) -> None:
         """Move less of a follower's interior where its polygon cells would be crushed.
 
         Raises RegridFailure where a cell would be left no volume even so.
@@ -232,19 +236,21 @@ class GridMotion:
         find_crushed = make_find_crushed(block.geometry)
         rebuilt = None
         for halvings in range(SPARING_HALVINGS + 1):
-            left, i, j = find_crushed(
+            volume_left, i, j = find_crushed(
                 block.nodes, block.nodes_new, block.excess_volume, block.excess_volume_new
             )
-            if left >= LEAST_VOLUME_LEFT:
+            if volume_left >= LEAST_VOLUME_LEFT:
                 return
             if halvings == SPARING_HALVINGS:
                 break
             if rebuilt is None:
                 rebuilt = block.nodes_new.copy()
-            most *= 0.5
-            nodes, self._limited[number] = self.limiters[number].limit(block.nodes, rebuilt, most)
+            largest_motion *= 0.5
+            nodes, self._limited[number] = self.limiters[number].limit(
+                block.nodes, rebuilt, largest_motion
+            )
             block.nodes_new[...] = nodes
-        if left <= 0.0:
+        if volume_left <= 0.0:
             raise RegridFailure(
                 f"sliding: the line of the other block takes all of cell i={i}, j={j}",
                 block=block.name,
@@ -258,7 +264,7 @@ def crosses_seam(block: Block) -> bool:
     for side, node in find_crossing(block.nodes_new) or ():
         for segment in block.segments:
             if segment.side == side and segment.start <= node <= segment.stop:
-                if segment.kind == "seam":
+                if segment.is_inner_seam:
                     return True
     return False
 

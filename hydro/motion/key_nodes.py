@@ -43,9 +43,9 @@ class KeyNode:
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
         self.constraining_faces: list[tuple[Block, int]] = []
-        self.carried = False  # an end of a carried seam, which moves it
+        self.is_tied = False  # an end of a carried seam, which moves it
         self.on_piston = False  # a moving line ends on a straight piston and slides along it
-        self.corner = (
+        self.corner_sine = (
             STRAIGHT_LINE_SINE  # sine of the angle from which two lines that hold the node are two
         )
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
@@ -58,10 +58,10 @@ class KeyNode:
         """
         first = self.position()
         for block, i, j in self.members[1:]:
-            own = block.nodes[:, i, j]
-            gap = np.abs(own - first).max()
-            if gap > 0.0 and gap <= LARGEST_CLOSED_GAP * _measure_least_way(block.nodes, i, j):
-                own[:] = first
+            member_position = block.nodes[:, i, j]
+            gap = np.abs(member_position - first).max()
+            if gap > 0.0 and gap <= LARGEST_CLOSED_GAP * _measure_least_distance(block.nodes, i, j):
+                member_position[:] = first
 
     def position(self) -> np.ndarray:
         """Where the first member is."""
@@ -94,10 +94,10 @@ class KeyNode:
                 count = 1
                 first_x = x
                 first_y = y
-            elif abs(x * first_y - y * first_x) > self.corner:
+            elif abs(x * first_y - y * first_x) > self.corner_sine:
                 return 2, first_x, first_y
             elif (
-                self.corner > STRAIGHT_LINE_SINE
+                self.corner_sine > STRAIGHT_LINE_SINE
             ):  # a smooth wall in chords: the normal between both
                 sign = 1.0 if x * first_x + y * first_y > 0.0 else -1.0
                 x, y = first_x + sign * x, first_y + sign * y
@@ -109,7 +109,7 @@ class KeyNode:
         """Velocity of the node [m/s], from speeds and faces of this step."""
         if self.given:
             return self._follow_given(t)
-        if self.carried or (not self.flowing and not self.seams):
+        if self.is_tied or (not self.flowing and not self.seams):
             return 0.0, 0.0
         walls, normal_x, normal_y = self.find_wall()
         if walls == 2:
@@ -149,34 +149,36 @@ class KeyNode:
 
         A moving line that ends on a piston goes along it as the contact does, across it with it.
         """
-        first, face = self.given[0]
-        velocity = first.velocity(t)
+        first_segment, face = self.given[0]
+        velocity = first_segment.velocity(t)
         # lines with different velocities: the point common to both moves on
-        for other, other_face in self.given[1:]:
-            second = other.velocity(t)
-            if second != velocity:
-                a, b = (
+        for other_segment, other_face in self.given[1:]:
+            other_velocity = other_segment.velocity(t)
+            if other_velocity != velocity:
+                first_normal, other_normal = (
                     member.block.rim.rows[NORMAL, k]
-                    for member, k in ((first, face), (other, other_face))
+                    for member, k in ((first_segment, face), (other_segment, other_face))
                 )
                 # of two normals
-                cross = float(a[0] * b[1] - a[1] * b[0])
-                if abs(cross) < 1e-9 * math.hypot(*a) * math.hypot(*b):
+                cross = float(first_normal[0] * other_normal[1] - first_normal[1] * other_normal[0])
+                if abs(cross) < 1e-9 * math.hypot(*first_normal) * math.hypot(*other_normal):
                     raise RunFailure(
-                        f"node: {first} and {other} have incompatible velocities",
+                        f"node: {first_segment} and {other_segment} have incompatible velocities",
                         cause="pistons-part",
-                        place=Place(first.block.name),
+                        place=Place(first_segment.block.name),
                     )
-                along = float(a[0] * velocity[0] + a[1] * velocity[1])
-                across = float(b[0] * second[0] + b[1] * second[1])
+                along = float(first_normal[0] * velocity[0] + first_normal[1] * velocity[1])
+                across = float(
+                    other_normal[0] * other_velocity[0] + other_normal[1] * other_velocity[1]
+                )
                 return (
-                    (along * float(b[1]) - across * float(a[1])) / cross,
-                    (across * float(a[0]) - along * float(b[0])) / cross,
+                    (along * float(other_normal[1]) - across * float(first_normal[1])) / cross,
+                    (across * float(first_normal[0]) - along * float(other_normal[0])) / cross,
                 )
         # one velocity; beside a moving contact only across the piston
         if not self.on_piston:
             return velocity
-        normal_x, normal_y = (float(n) for n in first.block.rim.rows[NORMAL, face])
+        normal_x, normal_y = (float(n) for n in first_segment.block.rim.rows[NORMAL, face])
         length = math.hypot(normal_x, normal_y)
         x, y = self._flow()
         slip = (normal_x * (y - velocity[1]) - normal_y * (x - velocity[0])) / length**2
@@ -191,10 +193,10 @@ class KeyNode:
         if self.tracks:
             self.settle()
 
-    def shift(self, way: np.ndarray) -> None:
-        """Move the new nodes of every member further by `way` (2,)."""
+    def shift(self, displacement: np.ndarray) -> None:
+        """Move the new nodes of every member further by `displacement` (2,)."""
         for block, i, j in self.members:
-            block.nodes_new[:, i, j] += way
+            block.nodes_new[:, i, j] += displacement
 
     def put_on_axis(self, near: float) -> None:
         """Let the new node be on the axis exactly where it is at most so far from it."""
@@ -214,7 +216,7 @@ class KeyNode:
             return  # a given velocity moves it
         track = self.tracks[0][0]
         block, i, j = self.members[0]
-        if any(other is not track for other, _, _ in self.tracks):
+        if any(other_track is not track for other_track, _, _ in self.tracks):
             return  # a corner of two tracks: it rests
         new = block.nodes_new[:, i, j]
         if np.array_equal(new, block.nodes[:, i, j]):
@@ -238,14 +240,14 @@ def _mean_contact_velocity(faces: list[tuple[Block, int]]) -> tuple[float, float
 def _end_nodes(segment: Segment) -> list[tuple[int, int, int]]:
     """(i, j, face) of both ends of a segment."""
     block = segment.block
-    found = []
+    ends = []
     for k, face in ((segment.start, segment.first), (segment.stop, segment.last - 1)):
         i, j = find_node(SIDE_NAMES.index(segment.side), k, 0, block.ni, block.nj)
-        found.append((i, j, face))
-    return found
+        ends.append((i, j, face))
+    return ends
 
 
-def _measure_least_way(nodes: np.ndarray, i: int, j: int) -> float:
+def _measure_least_distance(nodes: np.ndarray, i: int, j: int) -> float:
     """The shortest way from a node to those around it that lie elsewhere."""
     near = nodes[:, max(0, i - 1) : i + 2, max(0, j - 1) : j + 2]
     lengths = np.hypot(*(near - nodes[:, i : i + 1, j : j + 1]).reshape(2, -1))
@@ -288,10 +290,10 @@ def find_key_nodes(
             b = index[numbers[id(link.follower.block)], i2, j2]
             parent[root(a)] = root(b)
     for contact in contacts:
-        for one, other in contact.leader.find_joints():
+        for before, after in contact.leader.find_joints():
             a, b = (
                 index[numbers[id(segment.block)], *_end_nodes(segment)[end][:2]]
-                for segment, end in (one, other)
+                for segment, end in (before, after)
             )
             parent[root(a)] = root(b)
     # a key node for each group

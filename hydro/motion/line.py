@@ -1,9 +1,9 @@
 """The moving line of a segment: its track, its spacing, and the motion of its nodes.
 
-The kernels read and write the nodes of the block themselves.  The `span` (5,) of a line gives its
-location: the number of its side in SIDE_NAMES, its first node and its number of nodes on that side,
-the perimeter's number of its first face, and the start of its spacing in an array of the spacings
-of several lines.
+The kernels read and write the nodes of the block themselves.  The `location` (5,) of a line says
+where it is: the number of its side in SIDE_NAMES, its first node and its number of nodes on that
+side, the perimeter's number of its first face, and the start of its spacing in an array of the
+spacings of several lines.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_RESPACED_PART = 0.1
 FOLLOWED_WAY_PART = 0.2
 
 
-class Span(NamedTuple):
+class StepTime(NamedTuple):
     """The time of a step: from t over dt, which is `fraction` of the stable step."""
 
     t: float
@@ -37,24 +37,25 @@ class Span(NamedTuple):
 
 
 @kernel
-def spread_straight(nodes, spans, spacings):
-    """Spread nodes of a block by `spacings` on straight lines between their ends; spans (n, 5)."""
+def spread_straight(nodes, locations, spacings):
+    """Spread nodes of a block by `spacings` on straight lines between their ends; locations (n,
+    5)."""
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    for n in range(spans.shape[0]):
-        side, start, count, _, place = spans[n]
+    for number in range(locations.shape[0]):
+        side, start, count, _, first_spacing = locations[number]
         i, j = find_node(side, start, 0, ni, nj)
         i_end, j_end = find_node(side, start + count - 1, 0, ni, nj)
         for c in range(2):
             first = nodes[c, i, j]
             last = nodes[c, i_end, j_end]
             for k in range(1, count - 1):
-                part = spacings[place + k]
+                fraction = spacings[first_spacing + k]
                 i_here, j_here = find_node(side, start + k, 0, ni, nj)
-                nodes[c, i_here, j_here] = first * (1.0 - part) + last * part
+                nodes[c, i_here, j_here] = first * (1.0 - fraction) + last * fraction
 
 
 @compiled_once
-def move_line(nodes, nodes_new, span, rim, damping, dt, out):
+def move_line(nodes, nodes_new, location, rim, damping, dt, out):
     """Nodes of a segment moved with the contact velocities of its faces; returns the stretching.
 
     The ends are those of the new nodes.  Node velocity: the contact velocities of the two faces
@@ -65,7 +66,7 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     waves; out: the line's nodes (2, n).  Theory F6.2.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    side, start, count, first, _ = span
+    side, start, count, first, _ = location
     # ends as they were moved before
     for end in range(2):
         k = end * (count - 1)
@@ -76,17 +77,17 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
     for node in range(1, count - 1):
         k = first + node
         i, j = find_node(side, start + node, 0, ni, nj)
-        a_x, a_y = rim[NX, k - 1], rim[NY, k - 1]
-        b_x, b_y = rim[NX, k], rim[NY, k]
-        length_a = (a_x * a_x + a_y * a_y) ** 0.5
-        length_b = (b_x * b_x + b_y * b_y) ** 0.5
-        weight_a = length_b / (length_a + length_b)
-        weight_b = length_a / (length_a + length_b)
+        before_x, before_y = rim[NX, k - 1], rim[NY, k - 1]
+        after_x, after_y = rim[NX, k], rim[NY, k]
+        length_before = (before_x * before_x + before_y * before_y) ** 0.5
+        length_after = (after_x * after_x + after_y * after_y) ** 0.5
+        weight_before = length_after / (length_before + length_after)
+        weight_after = length_before / (length_before + length_after)
         for q in range(2):
-            speed = weight_a * rim[U_STAR + q, k - 1] + weight_b * rim[U_STAR + q, k]
+            speed = weight_before * rim[U_STAR + q, k - 1] + weight_after * rim[U_STAR + q, k]
             out[q, node] = nodes[q, i, j] + dt * (damping[q, node] + speed)
     # stretching: change of the segments over their lengths (theory F7.2)
-    most = 0.0
+    stretching = 0.0
     i, j = find_node(side, start, 0, ni, nj)
     for k in range(count - 1):
         i_next, j_next = find_node(side, start + k + 1, 0, ni, nj)
@@ -96,9 +97,9 @@ def move_line(nodes, nodes_new, span, rim, damping, dt, out):
         dx = (out[0, k + 1] - nodes[0, i_next, j_next]) - (out[0, k] - nodes[0, i, j])
         dy = (out[1, k + 1] - nodes[1, i_next, j_next]) - (out[1, k] - nodes[1, i, j])
         ratio = (dx * dx + dy * dy) ** 0.5 / length
-        most = ratio if ratio > most else most
+        stretching = ratio if ratio > stretching else stretching
         i, j = i_next, j_next
-    return most
+    return stretching
 
 
 @compiled_once(allocates=False)
@@ -116,14 +117,14 @@ def limit_spreading(moved, rim, first, dt, out):
         farthest = max(farthest, x * x + y * y)
     farthest = farthest**0.5
     if farthest > sound * dt:
-        part = sound * dt / farthest
+        fraction = sound * dt / farthest
         for c in range(2):
             for k in range(count):
-                out[c, k] = moved[c, k] + part * (out[c, k] - moved[c, k])
+                out[c, k] = moved[c, k] + fraction * (out[c, k] - moved[c, k])
 
 
 @compiled_once(allocates=False)
-def move_beside_neighbours(moved, arc, positions, out):
+def move_parallel_to_neighbours(moved, arc, positions, out):
     """Inner nodes of `out` (2, n), moved along the line `moved` without area.
 
     arc, positions (n,): where each is along the line and where it is to be.  A node that goes
@@ -134,83 +135,110 @@ def move_beside_neighbours(moved, arc, positions, out):
     """
     for k in range(1, moved.shape[1] - 1):
         length = arc[k + 1] - arc[k - 1]
-        most = MOST_RESPACED_PART * min(arc[k] - arc[k - 1], arc[k + 1] - arc[k]) / length
-        way = min(most, max(-most, (positions[k] - arc[k]) / length))
+        farthest = MOST_RESPACED_PART * min(arc[k] - arc[k - 1], arc[k + 1] - arc[k]) / length
+        fraction = min(farthest, max(-farthest, (positions[k] - arc[k]) / length))
         for c in range(2):
-            out[c, k] = moved[c, k] + way * (moved[c, k + 1] - moved[c, k - 1])
+            out[c, k] = moved[c, k] + fraction * (moved[c, k + 1] - moved[c, k - 1])
+
+
+@compiled_once
+def place_ends(nodes_new, location, line):
+    """Take both ends of a line (2, n) from where they were moved before."""
+    ni, nj = nodes_new.shape[1] - 1, nodes_new.shape[2] - 1
+    side, start, count, _, _ = location
+    for end in range(2):
+        k = end * (count - 1)
+        i, j = find_node(side, start + k, 0, ni, nj)
+        line[0, k] = nodes_new[0, i, j]
+        line[1, k] = nodes_new[1, i, j]
+
+
+@compiled_once
+def write_line(nodes_new, location, line):
+    """Write a line (2, n) into the block's new nodes."""
+    ni, nj = nodes_new.shape[1] - 1, nodes_new.shape[2] - 1
+    side, start, count, _, _ = location
+    for k in range(count):
+        i, j = find_node(side, start + k, 0, ni, nj)
+        nodes_new[0, i, j] = line[0, k]
+        nodes_new[1, i, j] = line[1, k]
+
+
+@compiled_once
+def respace_line(moved, spacing, relax, shape, walls, work):
+    """Spread the nodes `moved` (2, n) along their line into the rows 6 and 7 of `work` (8, n).
+
+    relax: how far they go to the spacing; shape: as of `carry_line`.  Returns what
+    `fill_redistributed` does: below 0 if all is well.  Theory R9.1.
+    """
+    is_spline, is_parallel, is_periodic, _, _ = shape
+    respaced = work[6:]
+    ends = np.array([0, moved.shape[1] - 1])
+    failed = curves.fill_redistributed(
+        moved, (spacing, relax), ends, is_spline, is_periodic, walls, work[:6], respaced
+    )
+    if is_parallel and failed < 0:
+        move_parallel_to_neighbours(moved, work[0], work[1], respaced)
+    return failed
 
 
 @kernel
-def carry_line(nodes, nodes_new, span, rim, dt, arrays, shaping, walls):
+def carry_line(nodes, nodes_new, location, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-    arrays: damping, what the nodes move beside the contact velocities [m/s] and moved nodes (2,
-    n), spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n). shaping: how
-    far to the spacing the nodes go, `relax` (not spread where it is 0, nor written below), is
-    the curve a spline, do nodes move beside their neighbours' chords, is it periodic, is it
-    closed, and the shortest segment that turning asks for (0: none, as of
-    `fill_turning_spacing`). walls at both ends as in `fill_redistributed`. Returns the
-    stretching, and what that returns: below 0 if all is well. No node is spread faster than
-    sound: in a step that a thin cell elsewhere makes very short, a part of the way would be a
-    jump.
+    arrays: damping, velocities of the nodes beside the contact's [m/s] and moved nodes (2, n),
+    spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
+    the spacing the nodes go, `relax` (not spread where it is 0, nor written below), and the shape:
+    whether the curve is a spline, whether nodes move parallel to their neighbours' chords, whether
+    it is periodic, whether it is closed, and the shortest segment that turning asks for (0: none,
+    as of `fill_turning_spacing`).  walls at both ends as in `fill_redistributed`.  Returns the
+    stretching, and what that returns: below 0 if all is well.  No node is spread faster than sound:
+    in a step that a thin cell elsewhere makes very short, a part of the way would be a jump.
     """
-    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    damping, beside, moved, spacing, turned, turning, work = arrays
-    relax, spline, beside_chords, periodic, closed, shortest = shaping
-    side, start, count, first, _ = span
+    damping, extra_velocity, moved, spacing, turned_spacing, turning, work = arrays
+    relax, shape = shaping
+    _, _, _, is_closed, shortest = shape
+    first_face = location[3]
+    count = moved.shape[1]
     stretching = 0.0
     # the nodes with the flow (theory F6.2)
     if dt > 0.0:
-        stretching = move_line(nodes, nodes_new, span, rim, damping, dt, moved)
+        stretching = move_line(nodes, nodes_new, location, rim, damping, dt, moved)
         for c in range(2):
             for k in range(count):
-                beside[c, k] = damping[c, k]
+                extra_velocity[c, k] = damping[c, k]
     if relax < 0.0:
         return stretching, -1
     # a spacing that gives a bend the segments that it needs (theory R9.2)
     if shortest > 0.0 and relax > 0.0:
         curves.fill_turning_spacing(
-            moved, spacing, turning, closed, walls[0], walls[1], shortest, turned
+            moved, spacing, turning, is_closed, walls[0], walls[1], shortest, turned_spacing
         )
-    # between the ends as they were moved before
-    for end in range(2):
-        k = end * (count - 1)
-        i, j = find_node(side, start + k, 0, ni, nj)
-        moved[0, k] = nodes_new[0, i, j]
-        moved[1, k] = nodes_new[1, i, j]
-    # nodes respaced along the line (theory R9.1), no faster than sound
+    place_ends(nodes_new, location, moved)
+    # nodes respaced along the line, no faster than sound
     failed = -1
     out = moved
     if relax > 0.0:
+        wanted = turned_spacing if shortest > 0.0 else spacing
+        failed = respace_line(moved, wanted, relax, shape, walls, work)
         out = work[6:]
-        wanted = turned if shortest > 0.0 else spacing
-        ends = np.array([0, count - 1])
-        failed = curves.fill_redistributed(
-            moved, (wanted, relax), ends, spline, periodic, walls, work[:6], out
-        )
-        if beside_chords and failed < 0:
-            move_beside_neighbours(moved, work[0], work[1], out)
         if dt > 0.0:
-            limit_spreading(moved, rim, first, dt, out)
+            limit_spreading(moved, rim, first_face, dt, out)
             for c in range(2):
                 for k in range(1, count - 1):
-                    beside[c, k] += (out[c, k] - moved[c, k]) / dt
-    # into the block's new nodes
-    for k in range(count):
-        i, j = find_node(side, start + k, 0, ni, nj)
-        nodes_new[0, i, j] = out[0, k]
-        nodes_new[1, i, j] = out[1, k]
+                    extra_velocity[c, k] += (out[c, k] - moved[c, k]) / dt
+    write_line(nodes_new, location, out)
     return stretching, failed
 
 
 @kernel
-def fill_extended(nodes, span, walls, out):
+def fill_extended(nodes, location, walls, out):
     """A line's nodes with two images (2, n + 4) beyond each end: mirrored in the walls there.
 
     A wall is given by its unit normal; (0, 0) is a free end, where they go through the end itself.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    side, start, count, _, _ = span
+    side, start, count, _, _ = location
     for k in range(count):
         i, j = find_node(side, start + k, 0, ni, nj)
         out[0, k + 2] = nodes[0, i, j]
@@ -218,17 +246,21 @@ def fill_extended(nodes, span, walls, out):
     for end in range(2):
         normal_x, normal_y = walls[end]
         inwards = 1 if end == 0 else -1
-        at = 2 if end == 0 else count + 1
-        for n in range(1, 3):
-            away_x = out[0, at + n * inwards] - out[0, at]
-            away_y = out[1, at + n * inwards] - out[1, at]
+        end_node = 2 if end == 0 else count + 1
+        for images_away in range(1, 3):
+            away_x = out[0, end_node + images_away * inwards] - out[0, end_node]
+            away_y = out[1, end_node + images_away * inwards] - out[1, end_node]
             if normal_x == 0.0 and normal_y == 0.0:
-                out[0, at - n * inwards] = out[0, at] - away_x
-                out[1, at - n * inwards] = out[1, at] - away_y
+                out[0, end_node - images_away * inwards] = out[0, end_node] - away_x
+                out[1, end_node - images_away * inwards] = out[1, end_node] - away_y
             else:
                 across = normal_x * away_x + normal_y * away_y
-                out[0, at - n * inwards] = out[0, at] + away_x - 2.0 * normal_x * across
-                out[1, at - n * inwards] = out[1, at] + away_y - 2.0 * normal_y * across
+                out[0, end_node - images_away * inwards] = (
+                    out[0, end_node] + away_x - 2.0 * normal_x * across
+                )
+                out[1, end_node - images_away * inwards] = (
+                    out[1, end_node] + away_y - 2.0 * normal_y * across
+                )
 
 
 @dataclass(frozen=True)
@@ -243,10 +275,10 @@ class Respacing:
     start: float
     end: float
 
-    def compute_van_leer_weights(self, t: float) -> float:
+    def compute_progress(self, t: float) -> float:
         """How far the change has come at t [s], from 0 to 1."""
-        part = min(1.0, max(0.0, (t - self.start) / (self.end - self.start)))
-        return part * part * (3.0 - 2.0 * part)
+        fraction = min(1.0, max(0.0, (t - self.start) / (self.end - self.start)))
+        return fraction * fraction * (3.0 - 2.0 * fraction)
 
 
 @dataclass(frozen=True)
@@ -279,8 +311,8 @@ class Shaping(NamedTuple):
     """How a line is kept in shape.
 
     `relax`: part of the way to its spacing that the nodes go along the line in a full step;
-    `shape` of the line between nodes, "chord" or "spline", or "beside", parallel to the chords
-    between their neighbours.  None: that of the flow's `LineRule`.
+    `shape` of the line between nodes, "chord" or "spline", or "parallel", to the chords between
+    their neighbours.  None: that of the flow's `LineRule`.
     """
 
     relax: float | None
@@ -291,7 +323,7 @@ ROLES: dict[Role, Shaping] = {
     Role.WITH_ENDS: Shaping(0.0, None),
     Role.FLOWING: Shaping(None, None),
     # a spline would swing about the end of the contact with the body, chords cut a jet's tip
-    Role.ON_BODY: Shaping(None, "beside"),
+    Role.ON_BODY: Shaping(None, "parallel"),
     # a spline would loop in the fold above the tip of a jet
     Role.AT_CONTACT: Shaping(FOLLOWED_WAY_PART, "chord"),
     Role.OPPOSITE: Shaping(FOLLOWED_WAY_PART, "chord"),
@@ -323,27 +355,29 @@ class Line:
         self.period: np.ndarray | None = None  # from the first node to the last, where they repeat
         self.neighbours: list[tuple[Line, int] | None] = [None, None]  # that go on, at which end
         self.damping = np.zeros_like(line)
-        self.beside_contact = np.zeros_like(line)  # what its nodes move, respaced or damped [m/s]
+        self.extra_velocity = np.zeros_like(line)  # what its nodes move, respaced or damped [m/s]
         self.extended = np.empty((2, line.shape[1] + 4))
         self.moved = np.empty_like(line)
         side = SIDE_NAMES.index(segment.side)
         count = line.shape[1]
-        self.span = np.array([side, segment.start, count, segment.first, 0])
+        self.location = np.array([side, segment.start, count, segment.first, 0])
         self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._turned_spacing = self.spacing.copy()
         self._turning = np.zeros(line.shape[1] - 1)
-        self.carried: Callable[[], np.ndarray] | None = None  # displacement of a carried seam
+        self.find_tied_displacement: Callable[[], np.ndarray] | None = (
+            None  # displacement of a carried seam
+        )
         self.role = Role.FLOWING if self.respaced else Role.WITH_ENDS
-        self._is_cut = False  # in this step, by a sliding contact
+        self._is_shortened = False  # in this step, by a sliding contact
 
     def find_spacing(self, t: float) -> np.ndarray:
         """The spacing at t [s]."""
         if self.last_spacing is None:
             return self.spacing
         change = self.last_spacing - self.spacing
-        return self.spacing + self.rule.respacing.compute_van_leer_weights(t) * change
+        return self.spacing + self.rule.respacing.compute_progress(t) * change
 
     def set_spacing(self, spacing: np.ndarray) -> None:
         """Where the nodes are to be along the line from now on: (n + 1,) from 0 to 1."""
@@ -363,7 +397,7 @@ class Line:
         if self.role is not Role.AT_CONTACT:
             self.role = Role.OPPOSITE
 
-    def beside(self, end: int, new: bool = False) -> np.ndarray:
+    def nodes_next_to(self, end: int, new: bool = False) -> np.ndarray:
         """The two old (or new) nodes (2, 2) next to an end, the nearer first."""
         block = self.segment.block
         line = self.segment.line(block.nodes_new if new else block.nodes)
@@ -380,7 +414,7 @@ class Line:
         block = self.segment.block
         extended = self.extended
         nodes = block.nodes_new if new else block.nodes
-        fill_extended(nodes, self.span, tuple(self.walls), extended)
+        fill_extended(nodes, self.location, tuple(self.walls), extended)
         if self.period is not None:
             line = self.segment.line(nodes)
             extended[:, :2] = line[:, -3:-1] - self.period[:, None]
@@ -389,31 +423,33 @@ class Line:
             for end, neighbour in enumerate(self.neighbours):
                 if neighbour is not None:
                     images = extended[:, 1::-1] if end == 0 else extended[:, -2:]
-                    images[...] = neighbour[0].beside(neighbour[1], new)
+                    images[...] = neighbour[0].nodes_next_to(neighbour[1], new)
         return extended
 
-    def move(self, span: Span) -> float:
+    def move(self, step: StepTime) -> float:
         """Move the nodes between the new ends, which are there, and spread them, unless the line
         may still be cut; returns the line's stretching."""
         segment = self.segment
         old = np.ascontiguousarray(segment.line(segment.block.nodes))
         new = segment.line(segment.block.nodes_new)
-        self._is_cut = False
+        self._is_shortened = False
         self.moved[:, 0] = new[:, 0]
         self.moved[:, -1] = new[:, -1]
-        self.fill_moved(old, new, span)
-        return 0.0 if self.role is Role.AT_CONTACT else self.settle(span.fraction)
+        self.fill_moved(old, new, step)
+        return 0.0 if self.role is Role.AT_CONTACT else self.settle(step.fraction)
 
-    def fill_moved(self, old: np.ndarray, new: np.ndarray, span: Span) -> None:
+    def fill_moved(self, old: np.ndarray, new: np.ndarray, step: StepTime) -> None:
         """Fill the inner nodes of `moved` from the old nodes and new ends (2, n + 1)."""
         raise NotImplementedError
 
-    def cut(self, at_start: bool, face: int, point: np.ndarray) -> None:
+    def shorten_to(self, at_start: bool, face: int, point: np.ndarray) -> None:
         """Let the line begin (or end) at a point on one of its faces, counted from there."""
-        away = self.moved if at_start else self.moved[:, ::-1]
-        part = np.arange(face + 1) / (face + 1.0)
-        away[:, : face + 1] = point[:, None] * (1.0 - part) + away[:, face + 1, None] * part
-        self._is_cut = True
+        nodes_from_end = self.moved if at_start else self.moved[:, ::-1]
+        fractions = np.arange(face + 1) / (face + 1.0)
+        nodes_from_end[:, : face + 1] = (
+            point[:, None] * (1.0 - fractions) + nodes_from_end[:, face + 1, None] * fractions
+        )
+        self._is_shortened = True
 
     def settle(self, fraction: float, dt: float = 0.0) -> float:
         """Spread the moved nodes by the spacing and write them between the new ends.
@@ -425,26 +461,26 @@ class Line:
         relax, shape = ROLES[self.role]
         if relax is None:
             relax = self.rule.relax
-        relax = 1.0 if self._is_cut else float(relax * min(1.0, fraction))
+        relax = 1.0 if self._is_shortened else float(relax * min(1.0, fraction))
         shape = self.rule.shape if shape is None else shape
         if relax == dt == 0.0:
             self.segment.line(self.segment.block.nodes_new)[:, 1:-1] = self.moved[:, 1:-1]
             return 0.0
-        return self._carry(relax, shape, dt)
+        return self._move_and_respace(relax, shape, dt)
 
-    def _carry(self, relax: float, shape: str, dt: float) -> float:
+    def _move_and_respace(self, relax: float, shape: str, dt: float) -> float:
         block = self.segment.block
-        shaping = (
-            relax, shape == "spline", shape == "beside", self.period is not None, self.closed,
+        line_shape = (
+            shape == "spline", shape == "parallel", self.period is not None, self.closed,
             self.shortest,
         )  # fmt: skip
         arrays = (
-            self.damping, self.beside_contact, self.moved, self.spacing, self._turned_spacing,
+            self.damping, self.extra_velocity, self.moved, self.spacing, self._turned_spacing,
             self._turning, self._work,
         )  # fmt: skip
         stretching, failed = carry_line.entry(
-            block.nodes, block.nodes_new, self.span, block.rim.rows, dt, arrays, shaping,
-            tuple(self.walls),
+            block.nodes, block.nodes_new, self.location, block.rim.rows, dt, arrays,
+            (relax, line_shape),            tuple(self.walls),
         )  # fmt: skip
         if failed >= 0:
             raise curves.make_crossing(failed)
@@ -457,11 +493,11 @@ class FlowLine(Line):
     waits = False
     respaced = True
 
-    def move(self, span):
-        self._is_cut = False
+    def move(self, step):
+        self._is_shortened = False
         if self.role is Role.AT_CONTACT:
-            return self._carry(-1.0, self.rule.shape, span.dt)
-        return self.settle(span.fraction, span.dt)
+            return self._move_and_respace(-1.0, self.rule.shape, step.dt)
+        return self.settle(step.fraction, step.dt)
 
 
 class StraightLine(Line):
@@ -471,19 +507,19 @@ class StraightLine(Line):
         """Whether its track is straight, and no other line sets its spacing."""
         return self.track.straight and self.role is not Role.OPPOSITE
 
-    def move(self, span):
+    def move(self, step):
         if not self.lies_straight():
-            return super().move(span)
-        self.spread_straight(span.t + span.dt)
+            return super().move(step)
+        self.spread_straight(step.t + step.dt)
         return 0.0
 
-    def fill_moved(self, old, new, span):
-        self.spread_straight(span.t + span.dt)
+    def fill_moved(self, old, new, step):
+        self.spread_straight(step.t + step.dt)
         self.moved[...] = new
 
     def spread_straight(self, t: float) -> None:
         """New nodes by its spacing at t [s] on the straight line between the new ends."""
-        spread_straight(self.segment.block.nodes_new, self.span[None], self.find_spacing(t))
+        spread_straight(self.segment.block.nodes_new, self.location[None], self.find_spacing(t))
 
 
 class GivenLine(StraightLine):
@@ -502,21 +538,21 @@ class GivenLine(StraightLine):
     def lies_straight(self):
         return self.has_sliding_end and self.role is not Role.OPPOSITE
 
-    def fill_moved(self, old, new, span):
+    def fill_moved(self, old, new, step):
         if self.has_sliding_end:
-            super().fill_moved(old, new, span)
+            super().fill_moved(old, new, step)
             return
-        x, y = self.segment.velocity(span.t + 0.5 * span.dt)
-        self.moved[0, 1:-1] = old[0, 1:-1] + span.dt * x
-        self.moved[1, 1:-1] = old[1, 1:-1] + span.dt * y
+        x, y = self.segment.velocity(step.t + 0.5 * step.dt)
+        self.moved[0, 1:-1] = old[0, 1:-1] + step.dt * x
+        self.moved[1, 1:-1] = old[1, 1:-1] + step.dt * y
 
 
 class TrackLine(StraightLine):
     """A line whose nodes stay on its track, spread between the ends by its spacing."""
 
-    def fill_moved(self, old, new, span):
+    def fill_moved(self, old, new, step):
         if self.track.straight:
-            super().fill_moved(old, new, span)
+            super().fill_moved(old, new, step)
         else:
             spread = self.track.spread(new[:, 0], new[:, -1], self.spacing)
             self.moved[:, 1:-1] = spread[:, 1:-1]
@@ -525,17 +561,17 @@ class TrackLine(StraightLine):
 class JoinedLine(Line):
     """A line that nothing holds: it goes with its ends, or with the contacts that carry it."""
 
-    def fill_moved(self, old, new, span):
-        if self.carried is not None:
-            self.moved[:, 1:-1] = old[:, 1:-1] + self.carried()[:, 1:-1]
+    def fill_moved(self, old, new, step):
+        if self.find_tied_displacement is not None:
+            self.moved[:, 1:-1] = old[:, 1:-1] + self.find_tied_displacement()[:, 1:-1]
             return
-        step = new[:, [0, -1]] - old[:, [0, -1]]
-        spacing = self.find_spacing(span.t)
+        shift_of_ends = new[:, [0, -1]] - old[:, [0, -1]]
+        spacing = self.find_spacing(step.t)
         self.moved[:, 1:-1] = old[:, 1:-1] + (
-            step[:, :1] * (1.0 - spacing[1:-1]) + step[:, 1:] * spacing[1:-1]
+            shift_of_ends[:, :1] * (1.0 - spacing[1:-1]) + shift_of_ends[:, 1:] * spacing[1:-1]
         )
         if self.last_spacing is not None:
-            change = self.find_spacing(span.t + span.dt) - spacing
+            change = self.find_spacing(step.t + step.dt) - spacing
             self.moved[:, 1:-1] += (new[:, -1:] - new[:, :1]) * change[1:-1]
 
 

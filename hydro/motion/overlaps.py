@@ -24,8 +24,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.boundary import Axis, NodeMotion, Piston, Segment, Wall
+from shockgrid.hydro.boundary import NodeMotion, Piston, Segment
 from shockgrid.hydro.links import Link
+from shockgrid.hydro.perimeter.contacts import PISTON
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.regrid.errors import BadInput, Place, RunFailure
 from shockgrid.regrid.jit import kernel
@@ -90,13 +91,13 @@ class Outline:
             fill_boxes(self.inset, self.group, self.inset_boxes)
             self.is_boxed = True
 
-    def find_crossing(self, other: Outline) -> tuple[int, int] | None:
+    def find_crossing(self, other_outline: Outline) -> tuple[int, int] | None:
         """Indices of the faces of both at which one is inside the other's block, or None."""
         self.fill_boxes()
-        other.fill_boxes()
+        other_outline.fill_boxes()
         for line, inset, boxes, inset_boxes in (
-            (self.line, other.inset, self.boxes, other.inset_boxes),
-            (self.inset, other.line, self.inset_boxes, other.boxes),
+            (self.line, other_outline.inset, self.boxes, other_outline.inset_boxes),
+            (self.inset, other_outline.line, self.inset_boxes, other_outline.boxes),
         ):
             a, b = find_touching(line, inset, False, self.group, boxes, inset_boxes)
             if a >= 0:
@@ -114,14 +115,14 @@ def search(
     if not pairs:
         return None
     bounds = np.array([outline.bounds for outline in outlines])
-    first, second = np.array(pairs).T
-    low = np.maximum(bounds[first, ::2], bounds[second, ::2])
-    high = np.minimum(bounds[first, 1::2], bounds[second, 1::2])
+    first_numbers, second_numbers = np.array(pairs).T
+    low = np.maximum(bounds[first_numbers, ::2], bounds[second_numbers, ::2])
+    high = np.minimum(bounds[first_numbers, 1::2], bounds[second_numbers, 1::2])
     for number in np.flatnonzero((low <= high).all(axis=1)):
-        one, other = (outlines[k] for k in pairs[number])
-        at = one.find_crossing(other)
+        outline, other_outline = (outlines[k] for k in pairs[number])
+        at = outline.find_crossing(other_outline)
         if at is not None:
-            return one, other, at
+            return outline, other_outline, at
     return None
 
 
@@ -141,23 +142,23 @@ class Overlaps:
             for block in blocks
             for segment in block.segments
             if isinstance(segment, Segment)
-            and (not segment.linked or (segment.kind == "sliding" and not segment.is_follower))
+            and (not segment.linked or (segment.is_sliding and not segment.is_follower))
         ]
         self._outlines: list[Outline] = []  # of the segments that are watched
         self._watched: Pairs = []
 
     def check_start(self) -> None:
         """Raise BadInput if blocks of the initial grid overlap."""
-        found = search(self._make_outlines(self.segments), self._pair(self.segments))
-        if found is not None:
-            one, other, at = found
-            depth = describe_depth(one.segment.block, other.segment.block)
-            raise BadInput(f"{self._describe(one, other, at)}{depth}: {ADVICE}")
+        overlap = search(self._make_outlines(self.segments), self._pair(self.segments))
+        if overlap is not None:
+            outline, other_outline, at = overlap
+            depth = describe_depth(outline.segment.block, other_outline.segment.block)
+            raise BadInput(f"{self._describe(outline, other_outline, at)}{depth}: {ADVICE}")
         for pair in itertools.combinations(self.blocks, 2):
-            for block, other in (pair, pair[::-1]):
+            for block, other_outline in (pair, pair[::-1]):
                 i, j = block.ni // 2, block.nj // 2
                 x, y = block.nodes[:, i : i + 2, j : j + 2].mean(axis=(1, 2))
-                if is_inside((x, y), other.nodes):
+                if is_inside((x, y), other_outline.nodes):
                     raise BadInput(
                         f"blocks {pair[0].name!r} and {pair[1].name!r} lie on each other at "
                         f"x = {x:.6g} m, y = {y:.6g} m{describe_depth(*pair)}: {ADVICE}"
@@ -167,27 +168,29 @@ class Overlaps:
         """Raise BadInput if a piston will enter a block bounded by walls only before `t_end`."""
         # ways of all pistons
         times = np.linspace(0.0, t_end, CHECKED_TIMES)
-        ways = {
+        paths = {
             id(segment): integrate_motion(segment, times)
             for segment in self.segments
-            if isinstance(segment, Piston)
+            if segment.wall == PISTON
         }
-        for block in self.blocks if ways else ():
+        for block in self.blocks if paths else ():
             # blocks with walls only that keep their shape
-            own = [segment for segment in self.segments if segment.block is block]
-            if not own or not all(isinstance(s, Wall) and not isinstance(s, Axis) for s in own):
+            own_segments = [segment for segment in self.segments if segment.block is block]
+            if not own_segments or not all(s.is_rigid and s.meets_bodies for s in own_segments):
                 continue
-            moved = [ways.get(id(segment), np.zeros((2, CHECKED_TIMES))) for segment in own]
-            if not all(np.array_equal(way, moved[0]) for way in moved):
+            moved = [
+                paths.get(id(segment), np.zeros((2, CHECKED_TIMES))) for segment in own_segments
+            ]
+            if not all(np.array_equal(path, moved[0]) for path in moved):
                 continue  # it changes its shape: detected when it happens
             # pistons of other blocks, relative to this one
             for segment in self.segments:
                 linked = any({id(block), id(segment.block)} <= pair for pair in self._linked)
-                if segment.block is block or linked or id(segment) not in ways:
+                if segment.block is block or linked or id(segment) not in paths:
                     continue
                 line = segment.line(segment.block.nodes)
                 middles = 0.5 * (line[:, 1:] + line[:, :-1])
-                for t, x, y in zip(times, *(ways[id(segment)] - moved[0]), strict=True):
+                for t, x, y in zip(times, *(paths[id(segment)] - moved[0]), strict=True):
                     points = middles + np.array([[x], [y]])
                     if any(is_inside((px, py), block.nodes) for px, py in points.T):
                         raise BadInput(
@@ -196,12 +199,12 @@ class Overlaps:
                             "link the sides that meet, or end the run before"
                         )
 
-    def watch(self, everything: bool = False) -> None:
+    def watch(self, all_segments: bool = False) -> None:
         """From now on check unlinked pairs of which one moves independently, or all pairs."""
         pairs = [
             (a, b)
             for a, b in self._pair(self.segments)
-            if everything or _leaves(self.segments[a]) or _leaves(self.segments[b])
+            if all_segments or _leaves(self.segments[a]) or _leaves(self.segments[b])
         ]
         blocks = [id(segment.block) for segment in self.segments]
         pairs = [
@@ -223,13 +226,13 @@ class Overlaps:
             watched = [
                 (a, b) for a, b in watched if frozenset((blocks[a], blocks[b])) not in touching
             ]
-        found = search(self._outlines, watched)
-        if found is not None:
-            one, other, at = found
-            segment = one.segment
+        overlap = search(self._outlines, watched)
+        if overlap is not None:
+            outline, other_outline, at = overlap
+            segment = outline.segment
             raise RunFailure(
-                f"{self._describe(one, other, at)}, t = {t:.6g} s (step {step}): no link is "
-                "between these sides, and blocks without one pass through each other",
+                f"{self._describe(outline, other_outline, at)}, t = {t:.6g} s (step {step}): "
+                "no link is between these sides, and blocks without one pass through each other",
                 cause="blocks-overlap",
                 place=Place(segment.block.name, side=segment.side, nodes=(segment.start + at[0],)),
             )
@@ -244,19 +247,20 @@ class Overlaps:
         """All pairs except those within a block and those of a sliding contact."""
         return [
             (a, b)
-            for (a, one), (b, other) in itertools.combinations(enumerate(segments), 2)
-            if one.block is not other.block
+            for (a, segment), (b, other_segment) in itertools.combinations(enumerate(segments), 2)
+            if segment.block is not other_segment.block
             and not any(
-                {id(one), id(other)} & members and {id(one.block), id(other.block)} <= blocks
+                {id(segment), id(other_segment)} & members
+                and {id(segment.block), id(other_segment.block)} <= blocks
                 for members, blocks in self._contacts
             )
         ]
 
     @staticmethod
-    def _describe(one: Outline, other: Outline, at: tuple[int, int]) -> str:
-        a = one.segment
-        b = other.segment
-        x, y = 0.5 * (one.line[:, at[0]] + one.line[:, at[0] + 1])
+    def _describe(outline: Outline, other_outline: Outline, places: tuple[int, int]) -> str:
+        a = outline.segment
+        b = other_outline.segment
+        x, y = 0.5 * (outline.line[:, places[0]] + outline.line[:, places[0] + 1])
         return (
             f"block {a.block.name!r}, side {a.side}, and block {b.block.name!r}, side {b.side}, "
             f"lie on each other at x = {x:.6g} m, y = {y:.6g} m"
@@ -281,29 +285,27 @@ def integrate_motion(piston: Piston, times: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
 
 
-def describe_depth(one: Block, other: Block) -> str:
+def describe_depth(block: Block, other_block: Block) -> str:
     """Describe which block reaches how far into the other, from the nodes along their sides."""
-    found = 0.0, ""
-    for block, around in ((one, other), (other, one)):
-        line = trace_outline(around.nodes)
+    deepest = 0.0, ""
+    for inner, outer in ((block, other_block), (other_block, block)):
+        line = trace_outline(outer.nodes)
         start = line
-        way = np.roll(line, -1, axis=1) - line
-        square = (way * way).sum(axis=0)
+        steps = np.roll(line, -1, axis=1) - line
+        square = (steps * steps).sum(axis=0)
         start = start[:, square > 0.0]
-        way = way[:, square > 0.0]
+        steps = steps[:, square > 0.0]
         square = square[square > 0.0]
-        nodes = trace_outline(block.nodes)
+        nodes = trace_outline(inner.nodes)
         middles = 0.5 * (nodes + np.roll(nodes, -1, axis=1))
         for x, y in np.concatenate([nodes, middles], axis=1).T:
-            if is_inside((x, y), around.nodes):
+            if is_inside((x, y), outer.nodes):
                 away = np.array([[x], [y]]) - start
-                part = np.clip((away * way).sum(axis=0) / square, 0.0, 1.0)
-                depth = float(np.hypot(*(away - part * way)).min())
-                place = (
-                    f"; block {block.name!r} is up to {depth:.3g} m inside block {around.name!r}"
-                )
-                found = max(found, (depth, place))
-    return found[1]
+                fraction = np.clip((away * steps).sum(axis=0) / square, 0.0, 1.0)
+                depth = float(np.hypot(*(away - fraction * steps)).min())
+                place = f"; block {inner.name!r} is up to {depth:.3g} m inside block {outer.name!r}"
+                deepest = max(deepest, (depth, place))
+    return deepest[1]
 
 
 def is_inside(point: tuple[float, float], nodes: np.ndarray) -> bool:

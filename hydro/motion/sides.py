@@ -13,14 +13,14 @@ from shockgrid.hydro import phases
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import NodeMotion, Segment
 from shockgrid.hydro.links import Exchange
-from shockgrid.hydro.motion.constraints import CarriedSeam, CornerGuard, FollowerMotion, Joint
+from shockgrid.hydro.motion.constraints import CornerGuard, FollowerMotion, Joint, TiedSeam
 from shockgrid.hydro.motion.key_nodes import KeyNode, find_key_nodes
 from shockgrid.hydro.motion.line import (
     LINES,
     Line,
     LineRule,
     Role,
-    Span,
+    StepTime,
     StraightLine,
     spread_straight,
 )
@@ -31,6 +31,7 @@ from shockgrid.hydro.motion.smoothing import (
     find_thick_contacts,
 )
 from shockgrid.hydro.motion.track import join_tracks
+from shockgrid.hydro.rows import END_INDEX
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
 
@@ -44,9 +45,9 @@ class StraightSides:
         self.lines = lines
         self.block = lines[0].segment.block
         self.spacings = np.concatenate([line.spacing for line in lines])
-        self.spans = np.array([line.span for line in lines])
+        self.locations = np.array([line.location for line in lines])
         counts = [line.spacing.size for line in lines]
-        self.spans[:, -1] = np.cumsum(counts) - counts
+        self.locations[:, -1] = np.cumsum(counts) - counts
         self.respacing = None
         if any(line.last_spacing is not None for line in lines):
             self.respacing = lines[0].rule.respacing
@@ -56,20 +57,20 @@ class StraightSides:
         """Lay their new nodes, by their spacings at t [s], between their new ends."""
         if (
             self.respacing is not None
-            and (share := self.respacing.compute_van_leer_weights(t)) != self.share
+            and (share := self.respacing.compute_progress(t)) != self.share
         ):
             self.share = share
             self.spacings = np.concatenate([line.find_spacing(t) for line in self.lines])
-        spread_straight(self.block.nodes_new, self.spans, self.spacings)
+        spread_straight(self.block.nodes_new, self.locations, self.spacings)
 
     @classmethod
     def find(cls, lines: list[Line]) -> list[StraightSides]:
         """Those of all blocks."""
-        found: dict[int, list[StraightLine]] = {}
+        lines_of_blocks: dict[int, list[StraightLine]] = {}
         for line in lines:
             if line.waits and isinstance(line, StraightLine) and line.lies_straight():
-                found.setdefault(id(line.segment.block), []).append(line)
-        return [cls(own) for own in found.values()]
+                lines_of_blocks.setdefault(id(line.segment.block), []).append(line)
+        return [cls(lines_of_block) for lines_of_block in lines_of_blocks.values()]
 
 
 class Sides:
@@ -80,7 +81,7 @@ class Sides:
 
     def __init__(self, blocks, exchange: Exchange, rule: LineRule):
         self.stretching = 0.0
-        self.carried_seams: list[CarriedSeam] = []
+        self.tied_seams: list[TiedSeam] = []
         self.joints: list[Joint] = []
         self.followers = (
             [FollowerMotion(contact) for contact in exchange.contacts] if blocks else []
@@ -100,12 +101,12 @@ class Sides:
             self._end_lines(node)
             self._join_neighbours(node)
         self.thick_contacts: list[ThickContact] = find_thick_contacts(
-            [line for line in self.lines if line.segment.kind == "interface" and line.respaced]
+            [line for line in self.lines if line.segment.is_thick and line.respaced]
         )
         for link in exchange.links:
             line = self._find_line(link.leader)
-            if line is not None and link.leader.kind == "interface":
-                link.layer = line.beside_contact, line.closed
+            if line is not None and link.leader.is_thick:
+                link.layer = line.extra_velocity, line.closed
         for follower in self.followers:
             for end in (0, 1):
                 self._end_follower(follower, end)
@@ -113,12 +114,14 @@ class Sides:
         # lines in the order in which the passes take them
         self.moving = [line for line in self.lines if not line.waits]
         self.damped: list[SlidingLine | ThickContact | SurfaceLine] = [
-            SlidingLine(line) for line in self.moving if line.segment.kind == "sliding"
+            SlidingLine(line) for line in self.moving if line.segment.is_sliding
         ]
         self.damped += self.thick_contacts
         self.turning = [node for node in self.key_nodes if node.tracks]
         self.links = exchange.links
-        self.cut = [line for line in self.moving if line.role is Role.AT_CONTACT]
+        self.lines_at_contact_points = [
+            line for line in self.moving if line.role is Role.AT_CONTACT
+        ]
         self.straight = StraightSides.find(self.lines)
         spread = {id(line) for sides in self.straight for line in sides.lines}
         self.waiting = [line for line in self.lines if line.waits and id(line) not in spread]
@@ -141,24 +144,27 @@ class Sides:
         ]
         if len(sliding) != 2 or all(line.track.straight for line in sliding):
             return
-        one, other = (line.track for line in sliding)
+        track, other_track = (line.track for line in sliding)
         position = node.position()
-        a, b = (track.normal(track.locate(position)) for track in (one, other))
-        joined = join_tracks(one, other, position)
-        if joined is None or abs(a[0] * b[1] - a[1] * b[0]) > TRACK_CORNER_SINE:
+        normal, other_normal = (each.normal(each.locate(position)) for each in (track, other_track))
+        joined = join_tracks(track, other_track, position)
+        if (
+            joined is None
+            or abs(normal[0] * other_normal[1] - normal[1] * other_normal[0]) > TRACK_CORNER_SINE
+        ):
             return
-        one.set_nodes(joined)
+        track.set_nodes(joined)
         for line in self.lines:
-            if line.track is other:
-                line.track = one
-        node.corner = TRACK_CORNER_SINE
+            if line.track is other_track:
+                line.track = track
+        node.corner_sine = TRACK_CORNER_SINE
 
     def _let_slide_on_piston(self, node: KeyNode) -> None:
         """Let moving lines that end on a straight piston slide along it, pistons along pistons.
 
         Not the lines of sliding contacts: their followers go with them, and round-off would grow.
         """
-        if any(segment.kind == "sliding" for segment, _ in node.ends):
+        if any(segment.is_sliding for segment, _ in node.ends):
             return
         pistons = [self._by_segment[id(segment)] for segment, _ in node.given]
         if not all(line.track.straight for line in pistons):
@@ -172,21 +178,21 @@ class Sides:
 
     def _end_lines(self, node: KeyNode) -> None:
         """Tell the lines that end at a key node what they end on, and the node its tracks."""
-        held = []  # lines that hold the node, with their blocks
-        for other, _ in node.ends:
-            line = self._find_line(other)
-            slides = other.motion is NodeMotion.SLIDE
+        holding_tracks = []  # lines that hold the node, with their blocks
+        for holding_segment, _ in node.ends:
+            line = self._find_line(holding_segment)
+            slides = holding_segment.motion is NodeMotion.SLIDE
             if line is not None and (
-                slides or (node.on_piston and other.motion is NodeMotion.GIVEN)
+                slides or (node.on_piston and holding_segment.motion is NodeMotion.GIVEN)
             ):
-                held.append((other.block, line.track))
+                holding_tracks.append((holding_segment.block, line.track))
         for segment, face in node.ends:
             line = self._find_line(segment)
             if line is None or not line.respaced:
                 continue
             end = 0 if face == segment.first else 1
-            node.damping.append(line.damping[:, -end])
-            for block, track in held:
+            node.damping.append(line.damping[:, END_INDEX[end]])
+            for block, track in holding_tracks:
                 if block is segment.block:
                     line.walls[end] = track.normal(track.locate(node.position()))
                     if not track.straight:
@@ -200,35 +206,44 @@ class Sides:
 
     def _join_neighbours(self, node: KeyNode) -> None:
         """Let two lines of one contact that go on smoothly from block to block see each other."""
-        found = []
+        ending_lines = []
         for segment, face in node.ends:
             line = self._find_line(segment)
             if line is not None and segment.linked and line.respaced:
-                found.append((line, 0 if face == segment.first else 1))
-        if len(found) != 2 or found[0][0].segment.kind != found[1][0].segment.kind:
+                ending_lines.append((line, 0 if face == segment.first else 1))
+        if (
+            len(ending_lines) != 2
+            or ending_lines[0][0].segment.kind != ending_lines[1][0].segment.kind
+        ):
             return
-        (line, end), (other, other_end) = found
-        here = line.track.nodes[:, -end]
-        there = other.track.nodes[:, -other_end]
-        away = line.beside(end)[:, 0] - here
-        further = other.beside(other_end)[:, 0] - there
-        smooth = -(away @ further) > 0.8 * np.hypot(*away) * np.hypot(*further)
-        if smooth and line is not other and np.abs(here - there).max() < 1e-9 * np.hypot(*away):
-            line.neighbours[end] = (other, other_end)
-            other.neighbours[other_end] = (line, end)
+        (line, end), (other_line, other_end) = ending_lines
+        position = line.track.nodes[:, END_INDEX[end]]
+        other_position = other_line.track.nodes[:, END_INDEX[other_end]]
+        direction = line.nodes_next_to(end)[:, 0] - position
+        other_direction = other_line.nodes_next_to(other_end)[:, 0] - other_position
+        is_smooth = -(direction @ other_direction) > 0.8 * np.hypot(*direction) * np.hypot(
+            *other_direction
+        )
+        if (
+            is_smooth
+            and line is not other_line
+            and np.abs(position - other_position).max() < 1e-9 * np.hypot(*direction)
+        ):
+            line.neighbours[end] = (other_line, other_end)
+            other_line.neighbours[other_end] = (line, end)
 
     def _end_follower(self, follower: FollowerMotion, end: int) -> None:
         """Tell a sliding contact an end's key node and the lines that go on from there."""
         node = follower.key_nodes[end] = self._find_end(*follower.contact.follower.ends()[end])
-        for other, face in node.ends:
-            line = self._find_line(other)
-            if line is None or other.kind != "free-surface":
+        for free_segment, face in node.ends:
+            line = self._find_line(free_segment)
+            if line is None or not free_segment.is_free:
                 continue
             line.role = Role.AT_CONTACT
             follower.free_lines[end] = line
-            follower.starts[end] = face == other.first
-            side = OPPOSITE_SIDES[other.side]
-            across = [segment for segment in other.block.segments if segment.side == side]
+            follower.starts[end] = face == free_segment.first
+            side = OPPOSITE_SIDES[free_segment.side]
+            across = [segment for segment in free_segment.block.segments if segment.side == side]
             opposite = self._find_line(across[0]) if len(across) == 1 else None
             follower.opposites[end] = opposite
             if opposite is not None:
@@ -239,96 +254,96 @@ class Sides:
         free = set(SIDE_NAMES)
         for segment in block.segments:
             line = self._find_line(segment)
-            whole = segment.stop - segment.start == block.side_faces(segment.side)[1]
-            straight = line is not None and line.track.straight
-            if not (segment.motion is NodeMotion.SLIDE and straight and whole):
+            covers_side = segment.stop - segment.start == block.side_faces(segment.side)[1]
+            is_straight = line is not None and line.track.straight
+            if not (segment.motion is NodeMotion.SLIDE and is_straight and covers_side):
                 free.discard(segment.side)
         return tuple(sorted(free))
 
-    def let_slide(self, one: Segment, other: Segment) -> None:
+    def let_slide(self, contact: Segment, next_contact: Segment) -> None:
         """Let the key node between two contacts that go on smoothly slide along them.
 
         Both are leading segments; see `hydro.motion.constraints`.  Raises BadInput where they do
         not go on.
         """
-        line = self._find_line(one)
+        line = self._find_line(contact)
         for end, neighbour in enumerate(line.neighbours if line is not None else ()):
-            if neighbour and neighbour[0].segment is other:
-                node = self._find_end(one, one.first if end == 0 else one.last - 1)
+            if neighbour and neighbour[0].segment is next_contact:
+                node = self._find_end(contact, contact.first if end == 0 else contact.last - 1)
                 self.joints.append(Joint(node, (line, neighbour[0]), (end, neighbour[1])))
                 return
-        raise BadInput(f"{one} and {other} do not continue each other smoothly")
+        raise BadInput(f"{contact} and {next_contact} do not continue each other smoothly")
 
-    def carry(self, seam: Segment, one: Segment, other: Segment) -> None:
+    def carry(self, seam: Segment, contact: Segment, other_contact: Segment) -> None:
         """Let a seam go with two contacts (leading segments all); see `motion.constraints`."""
-        carried = CarriedSeam(seam, one, other)
+        tied_seam = TiedSeam(seam, contact, other_contact)
         for face in (seam.first, seam.last - 1):
             node = self._find_end(seam, face)
-            if node.flowing or node.given or node.carried:
+            if node.flowing or node.given or node.is_tied:
                 raise BadInput(f"{seam} cannot move with contacts: one of its ends moves otherwise")
-            carried.ends.append(node)
-        for node in carried.ends:
-            node.carried = True
-        self._by_segment[id(seam)].carried = carried.compute_displacement
-        self.carried_seams.append(carried)
+            tied_seam.ends.append(node)
+        for node in tied_seam.ends:
+            node.is_tied = True
+        self._by_segment[id(seam)].is_tied = tied_seam.compute_displacement
+        self.tied_seams.append(tied_seam)
 
 
 # --- passes; `hydro.step.SIDE_PASSES` says what each does, and why it stands where it does -------
 
 
-def space_contact_points(sides: Sides, span: Span) -> None:
+def space_contact_points(sides: Sides, step: StepTime) -> None:
     for follower in sides.followers:
-        follower.share_nodes()
+        follower.space_around_contact_points()
 
 
-def turn_mirrors(sides: Sides, span: Span) -> None:
+def turn_mirrors(sides: Sides, step: StepTime) -> None:
     for node in sides.turning:
         node.turn_mirrors()
 
 
-def damp_short_waves(sides: Sides, span: Span) -> None:
+def damp_short_waves(sides: Sides, step: StepTime) -> None:
     for damped in sides.damped:
-        damped.damp(span.dt)
+        damped.damp(step.dt)
 
 
-def move_key_nodes(sides: Sides, span: Span) -> None:
+def move_key_nodes(sides: Sides, step: StepTime) -> None:
     for node in sides.key_nodes:
-        node.move(span.t + 0.5 * span.dt, span.dt)
+        node.move(step.t + 0.5 * step.dt, step.dt)
 
 
-def move_lines(sides: Sides, span: Span) -> None:
-    sides.stretching = max([line.move(span) for line in sides.moving])
+def move_lines(sides: Sides, step: StepTime) -> None:
+    sides.stretching = max([line.move(step) for line in sides.moving])
 
 
-def slide_joints(sides: Sides, span: Span) -> None:
+def slide_joints(sides: Sides, step: StepTime) -> None:
     for joint in sides.joints:
-        joint.slide(joint.lines[0].rule.relax * min(1.0, span.fraction))
+        joint.slide(joint.lines[0].rule.relax * min(1.0, step.fraction))
 
 
-def move_carried_seams(sides: Sides, span: Span) -> None:
-    for carried in sides.carried_seams:
-        carried.move_ends()
+def move_tied_seams(sides: Sides, step: StepTime) -> None:
+    for tied_seam in sides.tied_seams:
+        tied_seam.move_ends()
 
 
-def lay_followers(sides: Sides, span: Span) -> None:
+def lay_followers(sides: Sides, step: StepTime) -> None:
     for follower in sides.followers:
         follower.lay_nodes()
 
 
-def spread_lines(sides: Sides, span: Span) -> None:
-    for straight in sides.straight:
-        straight.spread(span.t + span.dt)
-    for line in sides.cut:
-        line.settle(span.fraction)
+def spread_lines(sides: Sides, step: StepTime) -> None:
+    for straight_sides in sides.straight:
+        straight_sides.spread(step.t + step.dt)
+    for line in sides.lines_at_contact_points:
+        line.settle(step.fraction)
     for line in sides.waiting:
-        line.move(span)
+        line.move(step)
 
 
-def give_lines(sides: Sides, span: Span) -> None:
+def give_lines(sides: Sides, step: StepTime) -> None:
     for link in sides.links:
         link.copy_line_to_follower()
 
 
-def hold_corners(sides: Sides, span: Span) -> None:
+def hold_corners(sides: Sides, step: StepTime) -> None:
     for guard in sides.guards:
         guard.hold()

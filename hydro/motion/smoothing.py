@@ -59,25 +59,25 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
     band[:, :] = 0.0
     # the diagonals and the right side, in the order of elimination
     for k in range(count):
-        at = (count - k) % count if closed else count - 1 - k
-        row = find_band_place(at if backwards else k, count, closed)
+        place = (count - k) % count if closed else count - 1 - k
+        row = find_band_place(place if backwards else k, count, closed)
         band[row, 0] = main[k]
         band[row, HALF_BAND + 1] = right[k]
     # the couplings, each into the later of its two rows
     for k in range(count):
         for step in range(1, 3):
-            other = k + step
-            if other >= count:
+            other_place = k + step
+            if other_place >= count:
                 if not closed:
                     continue
-                other -= count
+                other_place -= count
             value = next_one[k] if step == 1 else next_two[k]
-            a = k
+            own_place = k
             if backwards:
-                a = (count - k) % count if closed else count - 1 - k
-                other = (count - other) % count if closed else count - 1 - other
-            row = find_band_place(a, count, closed)
-            column = find_band_place(other, count, closed)
+                own_place = (count - k) % count if closed else count - 1 - k
+                other_place = (count - other_place) % count if closed else count - 1 - other_place
+            row = find_band_place(own_place, count, closed)
+            column = find_band_place(other_place, count, closed)
             band[max(row, column), abs(row - column)] += value
     # factors L and D, and the right side through L
     for row in range(count):
@@ -99,8 +99,8 @@ def solve_along(main, next_one, next_two, right, closed, backwards, band, out):
         band[row, HALF_BAND + 1] = value
     # the solution, in the line's order
     for k in range(count):
-        at = (count - k) % count if closed else count - 1 - k
-        row = find_band_place(at if backwards else k, count, closed)
+        place = (count - k) % count if closed else count - 1 - k
+        row = find_band_place(place if backwards else k, count, closed)
         out[k] = band[row, HALF_BAND + 1]
 
 
@@ -116,12 +116,15 @@ def measure_lengths(nodes):
 
 @compiled_once
 def measure_nodes(nodes, lengths, closed, wall_first, wall_last):
-    """Of each node of `fill_thickness_way`: m, 1/m (0 if it is held), curvature, normal (2, n)."""
+    """Half spans m, 1/m (0 at held nodes), curvatures and normals (2, n) of a line's nodes.
+
+    See `fill_thickness_displacement`.
+    """
     edges = lengths.shape[0]
     count = edges if closed else edges + 1
-    mass = np.empty(count)
+    half_span = np.empty(count)
     inverse = np.empty(count)
-    bend = np.empty(count)
+    curvature = np.empty(count)
     normal = np.empty((2, count))
     for k in range(count):
         end = not closed and (k == 0 or k == edges)
@@ -129,10 +132,10 @@ def measure_nodes(nodes, lengths, closed, wall_first, wall_last):
         before = k - 1 if k > 0 else (edges - 1 if closed else 0)
         ax, ay = nodes[0, before + 1] - nodes[0, before], nodes[1, before + 1] - nodes[1, before]
         bx, by = nodes[0, after + 1] - nodes[0, after], nodes[1, after + 1] - nodes[1, after]
-        part = 1.0
+        end_weight = 1.0
         if end:
             nx, ny = wall_first if k == 0 else wall_last
-            part = 0.5 if nx != 0.0 or ny != 0.0 else 0.0
+            end_weight = 0.5 if nx != 0.0 or ny != 0.0 else 0.0
             if k == 0:  # the mirror image's segment, walked the same way
                 across = 2.0 * (nx * bx + ny * by)
                 ax, ay = across * nx - bx, across * ny - by
@@ -144,22 +147,22 @@ def measure_nodes(nodes, lengths, closed, wall_first, wall_last):
         width = max(width, FOLDED_LINE_SINE * (lengths[before] + lengths[after]))
         normal[0, k] = -ty / width
         normal[1, k] = tx / width
-        mass[k] = part * width
-        inverse[k] = 1.0 / mass[k] if part > 0.0 else 0.0
-        bend[k] = 0.0
-        if part > 0.0:
-            bend[k] = (ax * by - ay * bx) / (lengths[before] * lengths[after] * width)
-    return mass, inverse, bend, normal
+        half_span[k] = end_weight * width
+        inverse[k] = 1.0 / half_span[k] if end_weight > 0.0 else 0.0
+        curvature[k] = 0.0
+        if end_weight > 0.0:
+            curvature[k] = (ax * by - ay * bx) / (lengths[before] * lengths[after] * width)
+    return half_span, inverse, curvature, normal
 
 
 @compiled_once
-def make_system(stiff, mass, inverse, bend, closed, strength):
-    """The system of `fill_thickness_way`: the diagonals that `solve_along` takes, and right side.
+def make_system(inverse_lengths, half_span, inverse, curvature, closed, strength):
+    """Diagonals for `solve_along` and right side of the system of `fill_thickness_displacement`.
 
-    stiff: 1/h of the segments.
+    inverse_lengths: 1/h of the segments.
     """
-    edges = stiff.shape[0]
-    count = mass.shape[0]
+    edges = inverse_lengths.shape[0]
+    count = half_span.shape[0]
     main = np.zeros(count)
     next_one = np.zeros(count)
     next_two = np.zeros(count)
@@ -167,17 +170,23 @@ def make_system(stiff, mass, inverse, bend, closed, strength):
     middle = np.empty(count)
     # the main diagonal; the curvature's differences
     for k in range(count):
-        left_stiff = stiff[k - 1] if k > 0 else (stiff[edges - 1] if closed else 0.0)
-        right_stiff = stiff[k] if k < edges else 0.0
-        left = (k - 1) % count
-        ahead = (k + 1) % count
-        middle[k] = -(left_stiff + right_stiff)
-        main[k] = mass[k] + strength * (
-            (left_stiff * left_stiff * inverse[left] + right_stiff * right_stiff * inverse[ahead])
+        inverse_before = (
+            inverse_lengths[k - 1] if k > 0 else (inverse_lengths[edges - 1] if closed else 0.0)
+        )
+        inverse_after = inverse_lengths[k] if k < edges else 0.0
+        node_before = (k - 1) % count
+        node_after = (k + 1) % count
+        middle[k] = -(inverse_before + inverse_after)
+        main[k] = half_span[k] + strength * (
+            (
+                inverse_before * inverse_before * inverse[node_before]
+                + inverse_after * inverse_after * inverse[node_after]
+            )
             + middle[k] * middle[k] * inverse[k]
         )
         right[k] = -strength * (
-            left_stiff * (bend[left] - bend[k]) + right_stiff * (bend[ahead] - bend[k])
+            inverse_before * (curvature[node_before] - curvature[k])
+            + inverse_after * (curvature[node_after] - curvature[k])
         )
         if inverse[k] == 0.0:
             main[k] = 1.0
@@ -186,15 +195,17 @@ def make_system(stiff, mass, inverse, bend, closed, strength):
     for k in range(count):
         if not closed and k == count - 1:
             break
-        one = (k + 1) % count
-        two = (k + 2) % count
-        far_stiff = stiff[one] if one < edges else 0.0
-        if inverse[k] > 0.0 and inverse[one] > 0.0:
+        next_node = (k + 1) % count
+        second_next = (k + 2) % count
+        inverse_beyond = inverse_lengths[next_node] if next_node < edges else 0.0
+        if inverse[k] > 0.0 and inverse[next_node] > 0.0:
             next_one[k] = (
-                strength * stiff[k] * (middle[k] * inverse[k] + middle[one] * inverse[one])
+                strength
+                * inverse_lengths[k]
+                * (middle[k] * inverse[k] + middle[next_node] * inverse[next_node])
             )
-        if inverse[k] > 0.0 and inverse[two] > 0.0 and (closed or k + 2 < count):
-            next_two[k] = strength * (stiff[k] * far_stiff) * inverse[one]
+        if inverse[k] > 0.0 and inverse[second_next] > 0.0 and (closed or k + 2 < count):
+            next_two[k] = strength * (inverse_lengths[k] * inverse_beyond) * inverse[next_node]
     return main, next_one, next_two, right
 
 
@@ -205,31 +216,33 @@ def keep_area(base, normal, inverse, edges, closed):
     The segments sweep a square of the ways beyond the sum of m phi; passes take it out.
     """
     count = base.shape[0]
-    way = base.copy()
+    displacement = base.copy()
     swept = np.empty(count)
-    most = 0.0
+    largest = 0.0
     for k in range(count):
-        most = max(most, abs(way[k]))
+        largest = max(largest, abs(displacement[k]))
     for _ in range(MOST_PASSES):
         change = 0.0
         for k in range(edges):
-            a = k
-            b = (k + 1) % count
-            swept[k] = normal[0, a] * normal[1, b] - normal[1, a] * normal[0, b]
-            swept[k] *= 0.25 * way[a] * way[b]
+            node = k
+            node_after = (k + 1) % count
+            swept[k] = (
+                normal[0, node] * normal[1, node_after] - normal[1, node] * normal[0, node_after]
+            )
+            swept[k] *= 0.25 * displacement[node] * displacement[node_after]
         for k in range(count):
             before = swept[k - 1] if k > 0 else (swept[edges - 1] if closed else 0.0)
             after = swept[k] if k < edges else 0.0
             new = base[k] + (before + after) * inverse[k]
-            change = max(change, abs(new - way[k]))
-            way[k] = new
-        if change <= SETTLED_PASS_CHANGE * most:
+            change = max(change, abs(new - displacement[k]))
+            displacement[k] = new
+        if change <= SETTLED_PASS_CHANGE * largest:
             break
-    return way
+    return displacement
 
 
 @kernel
-def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
+def fill_thickness_displacement(nodes, closed, wall_first, wall_last, strength, out):
     """Ways (2, n) of a line's nodes in a step; `strength` is V delta^3 dt [m4].
 
     With phi the way along the normal, m the distance between a node's neighbours over two, h the
@@ -245,19 +258,21 @@ def fill_thickness_way(nodes, closed, wall_first, wall_last, strength, out):
     """
     lengths = measure_lengths(nodes)
     edges = lengths.shape[0]
-    mass, inverse, bend, normal = measure_nodes(nodes, lengths, closed, wall_first, wall_last)
-    main, next_one, next_two, right = make_system(
-        1.0 / lengths, mass, inverse, bend, closed, strength
+    half_span, inverse, curvature, normal = measure_nodes(
+        nodes, lengths, closed, wall_first, wall_last
     )
-    count = mass.shape[0]
-    first, second = np.empty(count), np.empty(count)
+    main, next_one, next_two, right = make_system(
+        1.0 / lengths, half_span, inverse, curvature, closed, strength
+    )
+    count = half_span.shape[0]
+    forwards, backwards = np.empty(count), np.empty(count)
     band = np.empty((count, HALF_BAND + 2))
-    solve_along(main, next_one, next_two, right, closed, False, band, first)
-    solve_along(main, next_one, next_two, right, closed, True, band, second)
-    way = keep_area(0.5 * (first + second), normal, inverse, edges, closed)
+    solve_along(main, next_one, next_two, right, closed, False, band, forwards)
+    solve_along(main, next_one, next_two, right, closed, True, band, backwards)
+    displacement = keep_area(0.5 * (forwards + backwards), normal, inverse, edges, closed)
     for k in range(nodes.shape[1]):
         for c in range(2):
-            out[c, k] = way[k % count] * normal[c, k % count]
+            out[c, k] = displacement[k % count] * normal[c, k % count]
 
 
 @compiled_once(allocates=False)
@@ -274,20 +289,21 @@ def measure_line_speed(nodes, faces, walls):
     """Mean over a line of the slip and of its faces' speed beside their mean [m/s].
 
     nodes (2, n + 1); faces (3, n): velocity of the contact and slip.  Walls at the ends as in
-    `fill_thickness_way`: across them the line and its images have their own speed for a mean.
+    `fill_thickness_displacement`: across them the line and its images have their own speed for a
+    mean.
     """
     count = faces.shape[1]
-    sizes = np.ones(count)
+    weights = np.ones(count)
     lengths = measure_lengths(nodes)
-    lengths /= sum_evenly(sizes, lengths)
+    lengths /= sum_evenly(weights, lengths)
     mean_x, mean_y = sum_evenly(faces[0], lengths), sum_evenly(faces[1], lengths)
     end_x = 0.0
     end_y = 0.0
     ends = 0
-    for (nx, ny), at, beside in ((walls[0], 0, 1), (walls[1], -1, -2)):
+    for (nx, ny), end_face, next_face in ((walls[0], 0, 1), (walls[1], -1, -2)):
         if nx != 0.0 or ny != 0.0:
-            end_x += 1.5 * faces[0, at] - 0.5 * faces[0, beside]
-            end_y += 1.5 * faces[1, at] - 0.5 * faces[1, beside]
+            end_x += 1.5 * faces[0, end_face] - 0.5 * faces[0, next_face]
+            end_y += 1.5 * faces[1, end_face] - 0.5 * faces[1, next_face]
             ends += 1
     for nx, ny in walls:
         if nx != 0.0 or ny != 0.0:
@@ -295,21 +311,21 @@ def measure_line_speed(nodes, faces, walls):
             mean_x, mean_y = mean_x + across * nx, mean_y + across * ny
     for k in range(count):
         u, v = faces[0, k] - mean_x, faces[1, k] - mean_y
-        sizes[k] = abs(faces[2, k]) + (u * u + v * v) ** 0.5
-    return sum_evenly(sizes, lengths)
+        weights[k] = abs(faces[2, k]) + (u * u + v * v) ** 0.5
+    return sum_evenly(weights, lengths)
 
 
 @kernel(allocates=False)
-def take_part(nodes, span, rim, start, backwards, line, faces):
+def gather_line(nodes, location, rim, start, backwards, line, faces):
     """Nodes and faces (contact velocity and slip) of a block's line, from `start` on.
 
     span: of `hydro.motion.line.Line`; `backwards`: from its last node to its first.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
-    side, first_node, count, first, _ = span
+    side, first_node, count, first, _ = location
     for k in range(count):
-        at = count - 1 - k if backwards else k
-        i, j = find_node(side, first_node + at, 0, ni, nj)
+        place = count - 1 - k if backwards else k
+        i, j = find_node(side, first_node + place, 0, ni, nj)
         line[0, start + k] = nodes[0, i, j]
         line[1, start + k] = nodes[1, i, j]
     for k in range(count - 1):
@@ -320,68 +336,68 @@ def take_part(nodes, span, rim, start, backwards, line, faces):
 
 
 @kernel(allocates=False)
-def give_part(speeds, start, backwards, out):
+def extract_line(speeds, start, backwards, out):
     """Those of the `speeds` that belong to one line, from `start` on, in its own order."""
     count = out.shape[1]
     for k in range(count):
-        at = start + (count - 1 - k if backwards else k)
-        out[0, k] = speeds[0, at]
-        out[1, k] = speeds[1, at]
+        place = start + (count - 1 - k if backwards else k)
+        out[0, k] = speeds[0, place]
+        out[1, k] = speeds[1, place]
 
 
 @kernel
-def fill_speeds(nodes, faces, closed, walls, cube, dt, out):
-    """Velocities (2, n) that let short waves decay; `cube`: that of the thickness [m3].
+def fill_speeds(nodes, faces, closed, walls, thickness_cubed, dt, out):
+    """Velocities (2, n) that let short waves decay; `thickness_cubed`: that of the thickness [m3].
 
-    Other arguments as in `measure_line_speed` and `fill_thickness_way`.
+    Other arguments as in `measure_line_speed` and `fill_thickness_displacement`.
     """
-    strength = measure_line_speed(nodes, faces, walls) * cube * dt
+    strength = measure_line_speed(nodes, faces, walls) * thickness_cubed * dt
     if not strength > 0.0:
         out[...] = 0.0
         return
-    fill_thickness_way(nodes, closed, walls[0], walls[1], strength, out)
+    fill_thickness_displacement(nodes, closed, walls[0], walls[1], strength, out)
     for k in range(out.shape[1]):
         for c in range(2):
             out[c, k] /= dt
 
 
 @compiled_once
-def damp_node(line, m, speed, bend, most):
-    """The velocity that lets the shortest waves decay at node `m` of a line (2, n).
+def damp_node(line, node, speed, bend_angle, largest_rate):
+    """The velocity that lets the shortest waves decay at node `node` of a line (2, n).
 
     speed: strength times V [m/s]; bend [rad], most [1/s]: see `fill_sliding_damping`.
     """
     # direction of the line and its fourth difference
-    tx = line[0, m + 1] - line[0, m - 1]
-    ty = line[1, m + 1] - line[1, m - 1]
+    tx = line[0, node + 1] - line[0, node - 1]
+    ty = line[1, node + 1] - line[1, node - 1]
     square = tx * tx + ty * ty
     fourth_x = (
-        (line[0, m + 2] + line[0, m - 2])
-        - 4.0 * (line[0, m + 1] + line[0, m - 1])
-        + 6.0 * line[0, m]
+        (line[0, node + 2] + line[0, node - 2])
+        - 4.0 * (line[0, node + 1] + line[0, node - 1])
+        + 6.0 * line[0, node]
     )
     fourth_y = (
-        (line[1, m + 2] + line[1, m - 2])
-        - 4.0 * (line[1, m + 1] + line[1, m - 1])
-        + 6.0 * line[1, m]
+        (line[1, node + 2] + line[1, node - 2])
+        - 4.0 * (line[1, node + 1] + line[1, node - 1])
+        + 6.0 * line[1, node]
     )
     spacing = 0.5 * square**0.5
     rate = speed / (16.0 * spacing)
     # stronger where the line turns
-    ax = line[0, m] - line[0, m - 1]
-    ay = line[1, m] - line[1, m - 1]
-    bx = line[0, m + 1] - line[0, m]
-    by = line[1, m + 1] - line[1, m]
-    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend
+    ax = line[0, node] - line[0, node - 1]
+    ay = line[1, node] - line[1, node - 1]
+    bx = line[0, node + 1] - line[0, node]
+    by = line[1, node + 1] - line[1, node]
+    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by) / bend_angle
     rate *= 1.0 + turn * turn
-    rate = rate if rate < most else most
+    rate = rate if rate < largest_rate else largest_rate
     # normal part only
-    along = (fourth_x * ty - fourth_y * tx) / square
-    return -rate * along * ty, rate * along * tx
+    fourth_across = (fourth_x * ty - fourth_y * tx) / square
+    return -rate * fourth_across * ty, rate * fourth_across * tx
 
 
 @kernel
-def fill_sliding_damping(line, rim, start, strength, bend, most, out):
+def fill_sliding_damping(line, rim, start, strength, bend_angle, largest_rate, out):
     """Velocities that damp the shortest waves of a sliding contact; out (2, n).
 
         w = -strength × V / spacing × (fourth difference, normal part) / 16,     theory F6.7
@@ -389,7 +405,7 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
     of many nodes still roll up into kinks that no cell beside the line can follow: the strength
     grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
-    sharper than `bend` a node is taken back.
+    sharper than `bend_angle` a node is taken back.
     line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
     """
     count = out.shape[1]
@@ -402,18 +418,18 @@ def fill_sliding_damping(line, rim, start, strength, bend, most, out):
     mean_x /= count - 1
     mean_y /= count - 1
     for k in range(count):
-        m = k + 2
+        node = k + 2
         # V: slip and speed relative to the mean, over both faces
         speed = 0.0
         for face in (max(start, start + k - 1), min(start + count - 2, start + k)):
             away_x = rim[U_STAR, face] - mean_x
             away_y = rim[V_STAR, face] - mean_y
             speed += 0.5 * (rim[SLIP, face] + (away_x * away_x + away_y * away_y) ** 0.5)
-        out[0, k], out[1, k] = damp_node(line, m, strength * speed, bend, most)
+        out[0, k], out[1, k] = damp_node(line, node, strength * speed, bend_angle, largest_rate)
 
 
 @kernel
-def fill_surface_damping(line, rim, start, held, strength, bend, most, out):
+def fill_surface_damping(line, rim, start, held, strength, bend_angle, largest_rate, out):
     """Velocities that damp the shortest waves of a body's surface; out (2, n).
 
     As for a sliding contact, with the speed of the four faces around a node beside their mean for
@@ -437,7 +453,7 @@ def fill_surface_damping(line, rim, start, held, strength, bend, most, out):
             away_x = rim[U_STAR, face] - mean_x
             away_y = rim[V_STAR, face] - mean_y
             speed += 0.25 * (away_x * away_x + away_y * away_y) ** 0.5
-        out[0, k], out[1, k] = damp_node(line, k + 2, strength * speed, bend, most)
+        out[0, k], out[1, k] = damp_node(line, k + 2, strength * speed, bend_angle, largest_rate)
 
 
 class SlidingLine:
@@ -492,20 +508,22 @@ class ThickContact:
     one end where the first begins, or at its periodic image?
     """
 
-    def __init__(self, parts: list[tuple[Line, bool]], closed: bool):
-        self.parts = parts
+    def __init__(self, lines_in_order: list[tuple[Line, bool]], closed: bool):
+        self.parts = lines_in_order
         self.closed = closed
-        self.counts = np.cumsum([0] + [line.damping.shape[1] - 1 for line, _ in parts])
+        self.counts = np.cumsum([0] + [line.damping.shape[1] - 1 for line, _ in lines_in_order])
         self.nodes = np.empty((2, int(self.counts[-1]) + 1))
         self.way = np.empty_like(self.nodes)
         self.faces = np.empty((3, int(self.counts[-1])))
-        first = [length for line, _ in parts for length in np.hypot(*np.diff(line.track.nodes))]
-        thickness = parts[0][0].rule.thickness
-        own = THICK_CELLS * float(np.mean(first))
-        self.thickness = own if thickness is None else float(thickness)
-        for line, _ in parts:
-            line.closed = closed and len(parts) == 1
-            if len(parts) == 1 and (closed or FREE_END not in line.walls):
+        first = [
+            length for line, _ in lines_in_order for length in np.hypot(*np.diff(line.track.nodes))
+        ]
+        thickness = lines_in_order[0][0].rule.thickness
+        default_thickness = THICK_CELLS * float(np.mean(first))
+        self.thickness = default_thickness if thickness is None else float(thickness)
+        for line, _ in lines_in_order:
+            line.closed = closed and len(lines_in_order) == 1
+            if len(lines_in_order) == 1 and (closed or FREE_END not in line.walls):
                 # where lines meet their steps would jump
                 line.space_by_turning(SHORTEST_TURNED_SEGMENT * self.thickness)
 
@@ -519,20 +537,20 @@ class ThickContact:
         """Fill the velocities of the lines' nodes that let short waves decay."""
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
             block = line.segment.block
-            take_part(
-                block.nodes, line.span, block.rim.rows, int(start), backwards, self.nodes,
+            gather_line(
+                block.nodes, line.location, block.rim.rows, int(start), backwards, self.nodes,
                 self.faces,
             )  # fmt: skip
         fill_speeds.entry(
             self.nodes, self.faces, self.closed, self.find_walls(), self.thickness**3, dt, self.way
         )
         for (line, backwards), start in zip(self.parts, self.counts, strict=False):
-            give_part(self.way, int(start), backwards, line.damping)
+            extract_line(self.way, int(start), backwards, line.damping)
 
 
 def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:
     """The contacts of all lines, each from one end to the other."""
-    found = []
+    contacts = []
     left = {id(line): line for line in lines}
     for line in lines:
         if id(line) not in left:
@@ -545,16 +563,16 @@ def find_thick_contacts(lines: list[Line]) -> list[ThickContact]:
             if here is line:
                 break
         begins = here.neighbours[end] is None
-        parts: list[tuple[Line, bool]] = []
+        lines_in_order: list[tuple[Line, bool]] = []
         entry = end if begins else 0
         if not begins:
             here = line
         while id(here) in left:
             del left[id(here)]
-            parts.append((here, entry == 1))
+            lines_in_order.append((here, entry == 1))
             following = here.neighbours[1 - entry]
             if following is None:
                 break
             here, entry = following
-        found.append(ThickContact(parts, not begins or line.period is not None))
-    return found
+        contacts.append(ThickContact(lines_in_order, not begins or line.period is not None))
+    return contacts

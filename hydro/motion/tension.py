@@ -1,5 +1,4 @@
-"""Surface tension of moving lines: a jump of the pressure across them, and a force that sums to
-nothing.
+"""Surface tension of moving lines: a jump of the pressure across them, and a tangential force.
 
 The tension pulls on each face at its two end nodes, along the tangents t there,
 
@@ -45,10 +44,10 @@ def compute_tangents(line: np.ndarray) -> np.ndarray:
 
 def _find_tangents(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Unit tangents in the points `here` of the circles through three points each, (2, n) all."""
-    first, second = here - before, after - here
-    a = _square(first)
-    b = _square(second)
-    return _normalise(b * first + a * second)
+    step_before, step_after = here - before, after - here
+    square_before = _square(step_before)
+    square_after = _square(step_after)
+    return _normalise(square_after * step_before + square_before * step_after)
 
 
 def _square(vectors: np.ndarray) -> np.ndarray:
@@ -110,22 +109,22 @@ class SurfaceTension:
         """Nothing: contact speeds follow from the jumps of the old nodes."""
 
     def fill_fluxes(self, t: float, dt: float) -> None:
-        """The jumps on the faces at mid-time, and what of the forces is none, as tractions."""
+        """The pressure jumps on the mid-time faces, and the tangential forces as tractions."""
         for tense in self.lines:
             old = tense.line.extend().copy()
-            rest = self._fill_jump(tense, 0.5 * (old + tense.line.extend(new=True)))
+            tangential_force = self._fill_jump(tense, 0.5 * (old + tense.line.extend(new=True)))
             densities = [
                 side.rim.rho_trace[::order]
                 for side, order in zip(tense.sides, tense.orders, strict=True)
             ]
             total = sum(densities)
             for side, order, rho in zip(tense.sides, tense.orders, densities, strict=True):
-                side.rim.rows[TRACTION] = (rho / total * rest)[:, ::order]
+                side.rim.rows[TRACTION] = (rho / total * tangential_force)[:, ::order]
 
     def _fill_jump(self, tense: TenseLine, line: np.ndarray) -> np.ndarray:
-        """Write the jumps of a line's faces, which must be those of its nodes `line`; the rest.
+        """Write the pressure jumps on the faces between the nodes `line`; returns the other forces.
 
-        Returns (2, n): what of the forces is no jump of the pressure.  Theory F14.3.
+        These are the tangential ones, (2, n).  Theory F14.3.
         """
         force = tense.tension * self._compute_force(line)
         area = tense.sides[0].rim.rows[AREA]
@@ -158,8 +157,8 @@ class SurfaceTension:
                 _take_density(side)[::order]
                 for side, order in zip(tense.sides, tense.orders, strict=True)
             )
-            least = float((rho * square * np.sqrt(square)).min())
-            step = min(step, math.sqrt(least / (4.0 * math.pi * tense.tension)))
+            least_inertia = float((rho * square * np.sqrt(square)).min())
+            step = min(step, math.sqrt(least_inertia / (4.0 * math.pi * tense.tension)))
         return step
 
     def compute_energy(self) -> float:

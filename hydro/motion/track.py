@@ -39,11 +39,11 @@ class Track:
         track = self.nodes
         steps = np.diff(track)
         squares = (steps**2).sum(axis=0)
-        part = ((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares
-        part = np.clip(part, 0.0, 1.0)
-        miss = ((track[:, :-1] + part * steps - point[:, None]) ** 2).sum(axis=0)
+        fraction = ((point[:, None] - track[:, :-1]) * steps).sum(axis=0) / squares
+        fraction = np.clip(fraction, 0.0, 1.0)
+        miss = ((track[:, :-1] + fraction * steps - point[:, None]) ** 2).sum(axis=0)
         k = int(miss.argmin())
-        return float(self.arc[k] + part[k] * (self.arc[k + 1] - self.arc[k]))
+        return float(self.arc[k] + fraction[k] * (self.arc[k + 1] - self.arc[k]))
 
     def at(self, positions) -> np.ndarray:
         """Points (2, ...) of the track at arc lengths."""
@@ -69,20 +69,20 @@ class Track:
         return self.at(first + spacing * (last - first))
 
 
-def join_tracks(one: Track, other: Track, point: np.ndarray) -> np.ndarray | None:
+def join_tracks(track: Track, other_track: Track, point: np.ndarray) -> np.ndarray | None:
     """Both as one polyline if they meet at `point` with their ends; None where they do not.
 
     Also None where the other ends meet too: a closed track has no position to slide to or from.
     """
-    size = 1e-9 * (one.arc[-1] + other.arc[-1])
+    size = 1e-9 * (track.arc[-1] + other_track.arc[-1])
 
     def meets(track, end):
         return np.abs(track.nodes[:, end] - point).max() <= size
 
-    if not all(meets(track, 0) or meets(track, -1) for track in (one, other)):
+    if not all(meets(each, 0) or meets(each, -1) for each in (track, other_track)):
         return None
-    a = one.nodes if meets(one, -1) else one.nodes[:, ::-1]
-    b = other.nodes if meets(other, 0) else other.nodes[:, ::-1]
+    a = track.nodes if meets(track, -1) else track.nodes[:, ::-1]
+    b = other_track.nodes if meets(other_track, 0) else other_track.nodes[:, ::-1]
     if np.abs(a[:, 0] - b[:, -1]).max() <= size:
         return None
     return np.concatenate([a, b[:, 1:]], axis=1)

@@ -41,7 +41,7 @@ from shockgrid.hydro.rim import (
     TRACE,
     find_carried_row,
 )
-from shockgrid.hydro.rows import MASS
+from shockgrid.hydro.rows import END_INDEX, MASS
 from shockgrid.hydro.sliding.pieces import (
     SURFACE_ROWS,
     fill_pieces,
@@ -252,10 +252,10 @@ class SlidingContact:
         self.fixed = np.full(2, -1)
         for end, candidates in ((0, (last, 0)), (1, (0, last))):  # on a ring both would do
             for node in candidates:
-                if np.abs(follower_line[:, -end] - line[:, node]).max() < 1e-9 * size:
+                if np.abs(follower_line[:, END_INDEX[end]] - line[:, node]).max() < 1e-9 * size:
                     self.fixed[end] = node
             if self.fixed[end] >= 0:
-                follower_line[:, -end] = line[:, self.fixed[end]]
+                follower_line[:, END_INDEX[end]] = line[:, self.fixed[end]]
         # the follower's nodes lie on the leader's line, one after another
         positions = np.empty(follower_line.shape[1])
         project_in_order(line, follower_line, positions)

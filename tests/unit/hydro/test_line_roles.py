@@ -8,7 +8,7 @@ from shockgrid.hydro import phases
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import StiffenedGas
-from shockgrid.hydro.motion.line import ROLES, FlowLine, LineRule, Role, Span, TrackLine
+from shockgrid.hydro.motion.line import ROLES, FlowLine, LineRule, Role, StepTime, TrackLine
 
 RULE = LineRule(relax=0.05)
 ENDS = (0, -1)
@@ -30,7 +30,7 @@ def move(line, block):
     block.rim.c[:] = 1.0
     block.nodes_new[...] = block.nodes
     first = block.nodes[0, :, -1].copy()
-    line.move(Span(0.0, 1e3, 1.0))
+    line.move(StepTime(0.0, 1e3, 1.0))
     if line.role is Role.AT_CONTACT:  # it may have been cut in between
         line.settle(1.0)
     moved = block.nodes_new[0, :, -1]

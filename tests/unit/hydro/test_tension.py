@@ -12,7 +12,7 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.links import join
-from shockgrid.hydro.motion.smoothing import fill_thickness_way
+from shockgrid.hydro.motion.smoothing import fill_thickness_displacement
 from shockgrid.hydro.motion.tension import compute_tangents
 from shockgrid.hydro.rim import FLUX
 from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y, P
@@ -114,7 +114,7 @@ def smooth(line, closed, wall, strength, steps=1):
     line = np.ascontiguousarray(line)
     for _ in range(steps):
         way = np.empty_like(line)
-        fill_thickness_way(line, closed, wall, wall, strength, way)
+        fill_thickness_displacement(line, closed, wall, wall, strength, way)
         line = line + way
     return line
 

@@ -6,7 +6,7 @@ from discs import make_half_disc
 
 from builders import check_budget, free, make_body
 from shockgrid.hydro.boundary import put
-from shockgrid.hydro.motion.line import move_beside_neighbours
+from shockgrid.hydro.motion.line import move_parallel_to_neighbours
 from shockgrid.hydro.rows import P
 from shockgrid.hydro.simulation import Simulation
 
@@ -23,7 +23,7 @@ def test_nodes_go_along_a_line_without_area():
         positions = arc.copy()
         positions[node] += 0.1 * (arc[node + 1] - arc[node])
         moved = line.copy()
-        move_beside_neighbours(line, arc, positions, moved)
+        move_parallel_to_neighbours(line, arc, positions, moved)
         assert np.hypot(*(moved - line)[:, node]) > 0.0
         assert (np.delete(moved, node, axis=1) == np.delete(line, node, axis=1)).all()
         areas = [np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) for x, y in (line, moved)]

@@ -56,15 +56,15 @@ def find_groups(old, new, first, stop, boxes, reach, groups):
     for k in range(first, stop):
         low_x, high_x = min(low_x, old[0, k], new[0, k]), max(high_x, old[0, k], new[0, k])
         low_y, high_y = min(low_y, old[1, k], new[1, k]), max(high_y, old[1, k], new[1, k])
-    found = 0
+    count = 0
     for g in range(boxes.shape[1]):
         if low_x > boxes[MOST_X, g] + reach or high_x < boxes[LEAST_X, g] - reach:
             continue
         if low_y > boxes[MOST_Y, g] + reach or high_y < boxes[LEAST_Y, g] - reach:
             continue
-        groups[found] = g
-        found += 1
-    return found
+        groups[count] = g
+        count += 1
+    return count
 
 
 @compiled_once
@@ -75,13 +75,15 @@ def lies_away(x, y, boxes, g, reach):
 
 
 @compiled_once
-def may_lie_on(part, k, a):
+def may_lie_on(line_part, k, a):
     """Whether node `k` may lie on face `a`: in a line that meets itself, not on one beside it.
 
-    part: BOTH where they are of different lines; in one line, LATER where the node is of its later
-    part, the follower, and EARLIER where it is of the other one.
+    line_part: BOTH where they are of different lines; in one line, LATER where the node is of its
+    later part, the follower, and EARLIER where it is of the other one.
     """
-    return part == BOTH or (part == LATER and a + 1 < k) or (part == EARLIER and a > k)
+    return (
+        line_part == BOTH or (line_part == LATER and a + 1 < k) or (line_part == EARLIER and a > k)
+    )
 
 
 @compiled_once
@@ -114,11 +116,11 @@ def looks_at(points, k, line, a):
     at a right angle look at each other where the one is in front of the other.
     """
     dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
-    for way in (-1, 1):
-        if not 0 <= k + way < points.shape[1]:
+    for step in (-1, 1):
+        if not 0 <= k + step < points.shape[1]:
             continue
-        x, y = points[0, k + way], points[1, k + way]
-        along = way * ((x - points[0, k]) * dx + (y - points[1, k]) * dy)
+        x, y = points[0, k + step], points[1, k + step]
+        along = step * ((x - points[0, k]) * dx + (y - points[1, k]) * dy)
         square = (dx * dx + dy * dy) * ((x - points[0, k]) ** 2 + (y - points[1, k]) ** 2)
         is_square = along * along <= RIGHT_ANGLE_COSINE * RIGHT_ANGLE_COSINE * square
         if (find_depth(line, a, x, y) < 0.0) if is_square else along < 0.0:
@@ -138,83 +140,85 @@ def is_film(inner, k, line, a, x, y):
 
 
 @compiled_once
-def is_round_corner(line, mirrored, a, at, deep):
-    """Whether a point, `deep` [m] behind face `a` at the fraction `at` of it, is nearer to the next
-    side.
+def is_round_corner(line, mirrored, a, fraction, deep):
+    """Whether a point, `deep` [m] behind face `a` at this fraction of it, is nearer to
+    the next side.
 
     So it is at a corner of the other body.  Lines go on where their ends are `mirrored`.
     """
     length = measure_square(line, a) ** 0.5
     last = line.shape[1] - 2
-    round_start = a == 0 and not mirrored[0] and at * length < deep
-    return round_start or (a == last and not mirrored[1] and (1.0 - at) * length < deep)
+    round_start = a == 0 and not mirrored[0] and fraction * length < deep
+    return round_start or (a == last and not mirrored[1] and (1.0 - fraction) * length < deep)
 
 
 @kernel
-def find_pins(nodes, other, pins, tolerance, reach, one_body):
+def find_pins(nodes, other_nodes, pins, tolerance, reach, one_body):
     """Fill the positions of the nodes that lie on the other line, -1.0 for all others.
 
     On: closer than `tolerance` of a face's length, or behind a face that looks at the points' own
     line, by no more than MOST_BULGE of it: where a curved contact has opened, nodes lie behind the
-    other line's chords.  nodes, other: `LineNodes`; pins: `Pins` of the nodes; one_body: see
+    other line's chords.  nodes, other_nodes: `LineNodes`; pins: `Pins` of the nodes; one_body: see
     `is_film`; reach: MOST_BULGE of the longest face [m].  Returns how many do.
     """
     points = nodes.line
-    line = other.line
-    boxes = other.boxes
-    group = other.group
+    line = other_nodes.line
+    boxes = other_nodes.boxes
+    group = other_nodes.group
     count = line.shape[1] - 1
     last = points.shape[1] - 1
     groups = np.empty(boxes.shape[1], np.int64)
-    near = 0
-    found = 0
+    near_groups = 0
+    pin_count = 0
     for k in range(last + 1):
         # groups of faces that are near this group of nodes
         if k % group == 0:
-            near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
+            near_groups = find_groups(
+                points, points, k, min(last + 1, k + group), boxes, reach, groups
+            )
         pins.positions[k] = -1.0
-        if near == 0:
+        if near_groups == 0:
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         # the nearest face on which the node lies
-        least = 1e300
+        least_square = 1e300
         position = -1.0
-        for n in range(near):
-            g = groups[n]
+        for number in range(near_groups):
+            g = groups[number]
             if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                if not may_lie_on(pins.part, k, a):
+                if not may_lie_on(pins.line_part, k, a):
                     continue
-                at, away = project(line, a, x, y)
-                if away >= least:
+                fraction, distance_square = project(line, a, x, y)
+                if distance_square >= least_square:
                     continue
-                square = measure_square(line, a)
+                face_square = measure_square(line, a)
                 # on it, or behind it by no more than the bulge of a curved contact
-                is_on = away <= tolerance * tolerance * square
-                beside = 0.0 < at < 1.0 or is_mirrored_end(other, a + at)
-                if not is_on and beside and faces_each_other(line, a, along_x, along_y):
-                    deep = find_depth(line, a, x, y)
-                    is_on = 0.0 < deep <= MOST_BULGE * square**0.5
-                    if is_round_corner(line, other.mirrored, a, at, deep):
+                is_on = distance_square <= tolerance * tolerance * face_square
+                is_beside_face = 0.0 < fraction < 1.0 or is_mirrored_end(other_nodes, a + fraction)
+                if not is_on and is_beside_face and faces_each_other(line, a, along_x, along_y):
+                    depth = find_depth(line, a, x, y)
+                    is_on = 0.0 < depth <= MOST_BULGE * face_square**0.5
+                    if is_round_corner(line, other_nodes.mirrored, a, fraction, depth):
                         is_on = False  # behind the next side, at the corner of a body
                 # of the side that looks at it; of one body: not through a film
-                if is_on and pins.asked[k]:
+                if is_on and pins.counts[k]:
                     is_on = looks_at(points, k, line, a)
                     if is_on and one_body:
                         is_on = not is_film(nodes.inner, k, line, a, x, y)
                 if is_on:
-                    least = away
-                    position = snap_position(a + at)
+                    least_square = distance_square
+                    position = snap_position(a + fraction)
         pins.positions[k] = position
         if position >= 0.0:
-            found += 1
-    return found
+            pin_count += 1
+    return pin_count
 
 
 @kernel
-def find_deepest(nodes, other, pinned, reach):
+def find_deepest(nodes, other_nodes, pinned, reach):
     """The node furthest behind a face that looks at the nodes' line, in faces: (depth, node).
 
     Nodes that are `pinned`, with a position that is not negative, are not looked at, nor those
@@ -222,48 +226,50 @@ def find_deepest(nodes, other, pinned, reach):
     behind one side is in front of the next.
     """
     points = nodes.line
-    line = other.line
-    boxes = other.boxes
-    group = other.group
+    line = other_nodes.line
+    boxes = other_nodes.boxes
+    group = other_nodes.group
     count = line.shape[1] - 1
     last = points.shape[1] - 1
     groups = np.empty(boxes.shape[1], np.int64)
-    near = 0
+    near_groups = 0
     deepest = 0.0
-    which = -1
+    deepest_node = -1
     for k in range(last + 1):
         # groups of faces that are near this group of nodes
         if k % group == 0:
-            near = find_groups(points, points, k, min(last + 1, k + group), boxes, reach, groups)
-        if near == 0 or pinned[k] >= 0.0:
+            near_groups = find_groups(
+                points, points, k, min(last + 1, k + group), boxes, reach, groups
+            )
+        if near_groups == 0 or pinned[k] >= 0.0:
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         # how far the node is behind the face nearest to it
-        least = 1e300
+        least_square = 1e300
         depth = 0.0
-        for n in range(near):
-            g = groups[n]
+        for number in range(near_groups):
+            g = groups[number]
             if lies_away(x, y, boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                part, away = project(line, a, x, y)
-                if away >= least:
+                fraction, distance_square = project(line, a, x, y)
+                if distance_square >= least_square:
                     continue
-                least = away
+                least_square = distance_square
                 depth = 0.0
-                inner = 0 < a < count - 1 and 0.0 < part < 1.0
-                if inner and faces_each_other(line, a, along_x, along_y):
+                is_inner_face = 0 < a < count - 1 and 0.0 < fraction < 1.0
+                if is_inner_face and faces_each_other(line, a, along_x, along_y):
                     depth = max(0.0, find_depth(line, a, x, y) / measure_square(line, a) ** 0.5)
         # the deepest so far
-        if depth > deepest and least <= reach * reach:
+        if depth > deepest and least_square <= reach * reach:
             deepest = depth
-            which = k
-    return deepest, which
+            deepest_node = k
+    return deepest, deepest_node
 
 
 @kernel
-def measure_depths(nodes, other, reach, depths):
+def measure_depths(nodes, other_nodes, reach, depths):
     """Fill how far new nodes lie behind the other new line, `depths` (n,) [m]; below 0 in front.
 
     Behind: behind the nearest face, where that looks at the nodes' line; not, where they lie round
@@ -271,43 +277,47 @@ def measure_depths(nodes, other, reach, depths):
     -reach behind it.  reach: also for the way of both lines since their boxes were made.
     """
     points = nodes.new
-    line = other.new
-    group = other.group
+    line = other_nodes.new
+    group = other_nodes.group
     count = line.shape[1] - 1
     last = points.shape[1] - 1
-    groups = np.empty(other.boxes.shape[1], np.int64)
-    near = 0
+    groups = np.empty(other_nodes.boxes.shape[1], np.int64)
+    near_groups = 0
     for k in range(last + 1):
         # groups of faces that are near this group of nodes
         if k % group == 0:
             stop = min(last + 1, k + group)
-            near = find_groups(points, points, k, stop, other.boxes, reach, groups)
+            near_groups = find_groups(points, points, k, stop, other_nodes.boxes, reach, groups)
         depths[k] = -reach
-        if near == 0:
+        if near_groups == 0:
             continue
         x, y = points[0, k], points[1, k]
         along_x, along_y = find_direction(points, k)
         # the nearest face
-        least = reach * reach
-        for n in range(near):
-            g = groups[n]
-            if lies_away(x, y, other.boxes, g, reach):
+        least_square = reach * reach
+        for number in range(near_groups):
+            g = groups[number]
+            if lies_away(x, y, other_nodes.boxes, g, reach):
                 continue
             for a in range(g * group, min(count, (g + 1) * group)):
-                part, away = project(line, a, x, y)
-                if away >= least:
+                fraction, distance_square = project(line, a, x, y)
+                if distance_square >= least_square:
                     continue
-                least = away
-                depths[k] = -(away**0.5)
+                least_square = distance_square
+                depths[k] = -(distance_square**0.5)
                 if not faces_each_other(line, a, along_x, along_y):
                     continue
                 # behind it, and not only round a corner of the other body
-                deep = find_depth(line, a, x, y)
-                beside = a - 1 if part <= 0.0 else a + 1
-                if not 0.0 < part < 1.0 and 0 <= beside < count:  # nearest to a node: of both faces
-                    deep = min(deep, find_depth(line, beside, x, y))
-                if deep > 0.0 and not is_round_corner(line, other.mirrored, a, part, deep):
-                    depths[k] = away**0.5
+                depth = find_depth(line, a, x, y)
+                next_face = a - 1 if fraction <= 0.0 else a + 1
+                if (
+                    not 0.0 < fraction < 1.0 and 0 <= next_face < count
+                ):  # nearest to a node: of both faces
+                    depth = min(depth, find_depth(line, next_face, x, y))
+                if depth > 0.0 and not is_round_corner(
+                    line, other_nodes.mirrored, a, fraction, depth
+                ):
+                    depths[k] = distance_square**0.5
 
 
 @kernel
@@ -318,49 +328,57 @@ def sum_behind(points, depths):
     """
     area = 0.0
     for a in range(points.shape[1] - 1):
-        one = max(depths[a], depths[a + 1])
-        other = min(depths[a], depths[a + 1])
-        if one > 0.0:
-            mean = 0.5 * (one + other) if other >= 0.0 else 0.5 * one * one / (one - other)
+        deeper = max(depths[a], depths[a + 1])
+        shallower = min(depths[a], depths[a + 1])
+        if deeper > 0.0:
+            mean = (
+                0.5 * (deeper + shallower)
+                if shallower >= 0.0
+                else 0.5 * deeper * deeper / (deeper - shallower)
+            )
             area += mean * measure_square(points, a) ** 0.5
     return area
 
 
 @kernel
-def follow_pins(points, line, positions, part, found):
+def follow_pins(points, line, positions, line_part, later_positions):
     """Positions of the pins on the line near the old ones: where they were at `positions`."""
     last = line.shape[1] - 2
     for k in range(points.shape[1]):
-        found[k] = -1.0
+        later_positions[k] = -1.0
         if positions[k] < 0.0:
             continue
         middle = min(int(positions[k]), last)
-        least = 1e300
+        least_square = 1e300
         for a in range(max(0, middle - SEARCHED_FACES), min(last, middle + SEARCHED_FACES) + 1):
-            if not may_lie_on(part, k, a):
+            if not may_lie_on(line_part, k, a):
                 continue
-            at, away = project(line, a, points[0, k], points[1, k])
-            if away < least:
-                least = away
-                found[k] = snap_position(a + at)
+            fraction, distance_square = project(line, a, points[0, k], points[1, k])
+            if distance_square < least_square:
+                least_square = distance_square
+                later_positions[k] = snap_position(a + fraction)
 
 
 @compiled_once
-def goes_before(one, other, next_one, next_other):
+def goes_before(on_leader, on_follower, next_on_leader, next_on_follower):
     """Whether a pin comes before the next: lower on the leader, or there alike and higher on the
     other."""
-    return one < next_one or (one == next_one and other > next_other)
+    return on_leader < next_on_leader or (
+        on_leader == next_on_leader and on_follower > next_on_follower
+    )
 
 
 @compiled_once
-def put_pin(pins, row, count, one, other):
+def put_pin(pins, row, count, on_leader, on_follower):
     """Insert a pin into the `count` sorted ones of two rows from `row` on; nearly at their end."""
-    at = count
-    while at > 0 and goes_before(one, other, pins[row, at - 1], pins[row + 1, at - 1]):
-        pins[row, at], pins[row + 1, at] = pins[row, at - 1], pins[row + 1, at - 1]
-        at -= 1
-    pins[row, at] = one
-    pins[row + 1, at] = other
+    place = count
+    while place > 0 and goes_before(
+        on_leader, on_follower, pins[row, place - 1], pins[row + 1, place - 1]
+    ):
+        pins[row, place], pins[row + 1, place] = pins[row, place - 1], pins[row + 1, place - 1]
+        place -= 1
+    pins[row, place] = on_leader
+    pins[row + 1, place] = on_follower
 
 
 @compiled_once
@@ -371,46 +389,56 @@ def merge_pins(leader_positions, follower_positions, pins):
     of the follower's nodes on the leader; negative where a node lies on nothing.  Returns how many.
     """
     # pins of each line, sorted
-    own = 0
-    others = 0
+    follower_pins = 0
+    leader_pins = 0
     for k in range(follower_positions.shape[0] - 1, -1, -1):
         if follower_positions[k] >= 0.0:
-            put_pin(pins, 2, own, follower_positions[k], float(k))
-            own += 1
+            put_pin(pins, 2, follower_pins, follower_positions[k], float(k))
+            follower_pins += 1
     for k in range(leader_positions.shape[0]):
         if leader_positions[k] >= 0.0:
-            put_pin(pins, 4, others, float(k), leader_positions[k])
-            others += 1
+            put_pin(pins, 4, leader_pins, float(k), leader_positions[k])
+            leader_pins += 1
     # both together, each place once
-    kept = 0
-    one = 0
-    two = 0
-    while one < own or two < others:
+    merged_pins = 0
+    next_follower_pin = 0
+    next_leader_pin = 0
+    while next_follower_pin < follower_pins or next_leader_pin < leader_pins:
         row = 2
-        at = one
-        if one == own or (
-            two < others and goes_before(pins[4, two], pins[5, two], pins[2, one], pins[3, one])
+        column = next_follower_pin
+        if next_follower_pin == follower_pins or (
+            next_leader_pin < leader_pins
+            and goes_before(
+                pins[4, next_leader_pin],
+                pins[5, next_leader_pin],
+                pins[2, next_follower_pin],
+                pins[3, next_follower_pin],
+            )
         ):
             row = 4
-            at = two
-            two += 1
+            column = next_leader_pin
+            next_leader_pin += 1
         else:
-            one += 1
-        start = pins[row, at]
-        other = pins[row + 1, at]
-        if kept == 0 or pins[0, kept - 1] != start or pins[1, kept - 1] != other:
-            pins[0, kept] = start
-            pins[1, kept] = other
-            kept += 1
-    return kept
+            next_follower_pin += 1
+        on_leader = pins[row, column]
+        on_follower = pins[row + 1, column]
+        if (
+            merged_pins == 0
+            or pins[0, merged_pins - 1] != on_leader
+            or pins[1, merged_pins - 1] != on_follower
+        ):
+            pins[0, merged_pins] = on_leader
+            pins[1, merged_pins] = on_follower
+            merged_pins += 1
+    return merged_pins
 
 
 @compiled_once
 def lie_near(points, first, stop, line, a):
     """Whether the points first..stop - 1 lie no further than MOST_BULGE from face `a` of a line."""
     for k in range(first, stop):
-        _, away = project(line, a, points[0, k], points[1, k])
-        if away > MOST_BULGE * MOST_BULGE * measure_square(line, a):
+        _, distance_square = project(line, a, points[0, k], points[1, k])
+        if distance_square > MOST_BULGE * MOST_BULGE * measure_square(line, a):
             return False
     return True
 
@@ -424,7 +452,7 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
     """
     owners = facets.owners
     ends = facets.ends
-    found = 0
+    facet_count = 0
     covered[:] = False
     count = merge_pins(back_positions, positions, pins)
     last = leader.shape[1] - 2
@@ -447,43 +475,43 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
             continue
         # on one face of the leader, or on several within the bulge of the follower's
         if straight or stop <= a + 1.0:
-            owners[LEADER, found] = a
-            owners[FOLLOWER, found] = b
-            ends[LEADER_START, found] = start
-            ends[LEADER_STOP, found] = stop
-            ends[FOLLOWER_START, found] = high
-            ends[FOLLOWER_STOP, found] = low
-            found += 1
+            owners[LEADER, facet_count] = a
+            owners[FOLLOWER, facet_count] = b
+            ends[LEADER_START, facet_count] = start
+            ends[LEADER_STOP, facet_count] = stop
+            ends[FOLLOWER_START, facet_count] = high
+            ends[FOLLOWER_STOP, facet_count] = low
+            facet_count += 1
         elif lie_near(leader, a + 1, int(stop - SNAPPED_FACE_PART) + 1, follower, b):
-            here = start
-            other = high
-            while here < stop:
-                there = min(float(int(here) + 1), stop)
-                next_other = low
-                if there < stop:
-                    node = int(there)
+            facet_start = start
+            follower_start = high
+            while facet_start < stop:
+                facet_stop = min(float(int(facet_start) + 1), stop)
+                follower_stop = low
+                if facet_stop < stop:
+                    node = int(facet_stop)
                     covered[node] = True
-                    part, _ = project(follower, b, leader[0, node], leader[1, node])
+                    fraction, _ = project(follower, b, leader[0, node], leader[1, node])
                     if find_depth(follower, b, leader[0, node], leader[1, node]) > 0.0:
-                        back_positions[node] = b + part  # even beside a corner of the follower
-                    next_other = max(low, min(other, b + part))
-                owners[LEADER, found] = int(here)
-                owners[FOLLOWER, found] = b
-                ends[LEADER_START, found] = here
-                ends[LEADER_STOP, found] = there
-                ends[FOLLOWER_START, found] = other
-                ends[FOLLOWER_STOP, found] = next_other
-                found += 1
-                here = there
-                other = next_other
-    return found
+                        back_positions[node] = b + fraction  # even beside a corner of the follower
+                    follower_stop = max(low, min(follower_start, b + fraction))
+                owners[LEADER, facet_count] = int(facet_start)
+                owners[FOLLOWER, facet_count] = b
+                ends[LEADER_START, facet_count] = facet_start
+                ends[LEADER_STOP, facet_count] = facet_stop
+                ends[FOLLOWER_START, facet_count] = follower_start
+                ends[FOLLOWER_STOP, facet_count] = follower_stop
+                facet_count += 1
+                facet_start = facet_stop
+                follower_start = follower_stop
+    return facet_count
 
 
 @kernel
-def measure_facets(line, other, rigid, moved, inverse_dt, facets, count):
+def measure_facets(line, follower, rigid, displacement, inverse_dt, facets, count):
     """Fill the facets' `faces`: rows as of a perimeter's faces, outwards of the leader; normal.
 
-    line (2, m + 1): the leader at mid-time; other (2, n + 1): the follower; moved (2, m + 1): the
+    line (2, m + 1): the leader at mid-time; follower (2, n + 1); displacement (2, m + 1): the
     displacements of the leader's nodes.  The normal is the mean of those of both curves, or a rigid
     leader's own.
     """
@@ -496,7 +524,7 @@ def measure_facets(line, other, rigid, moved, inverse_dt, facets, count):
         x, y = find_point(line, a, start)
         x_end, y_end = find_point(line, a, stop)
         middle = 0.5 * (start + stop)
-        speed_x, speed_y = find_point(moved, a, middle)
+        speed_x, speed_y = find_point(displacement, a, middle)
         area_x, area_y = y_end - y, x - x_end
         faces[AREA_X, k] = area_x
         faces[AREA_Y, k] = area_y
@@ -506,9 +534,9 @@ def measure_facets(line, other, rigid, moved, inverse_dt, facets, count):
         normal_x, normal_y = find_curve_normal(line, a, middle - a, False, 1.0)
         if not rigid:
             b = facets.owners[FOLLOWER, k]
-            part = 0.5 * (ends[FOLLOWER_START, k] + ends[FOLLOWER_STOP, k]) - b
-            other_x, other_y = find_curve_normal(other, b, part, False, 1.0)
-            normal_x, normal_y = normal_x - other_x, normal_y - other_y
+            fraction = 0.5 * (ends[FOLLOWER_START, k] + ends[FOLLOWER_STOP, k]) - b
+            follower_x, follower_y = find_curve_normal(follower, b, fraction, False, 1.0)
+            normal_x, normal_y = normal_x - follower_x, normal_y - follower_y
         length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
         faces[NORMAL_X, k] = normal_x / length
         faces[NORMAL_Y, k] = normal_y / length

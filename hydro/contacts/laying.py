@@ -35,14 +35,14 @@ def find_held(facets, count, leader, follower):
 
     held: those of the follower at which a closed facet ends; of the leader those at which the
     closed part ends within a face of the follower; inside: the leader's nodes within that part;
-    stops: those of the leader at which a closed facet stops.
+    ends_facet: those of the leader at which a closed facet stops.
     """
     states = facets.states
     ends = facets.ends
     inside = leader.inside
     held = leader.held
     follower.held[:] = False
-    leader.stops[:] = False
+    leader.ends_facet[:] = False
     held[:] = False
     inside[:] = False
     for k in range(count):
@@ -58,7 +58,7 @@ def find_held(facets, count, leader, follower):
                 inside[node] = held[node]
                 held[node] = True
                 if row == LEADER_STOP:
-                    leader.stops[node] = True
+                    leader.ends_facet[node] = True
     for node in range(inside.shape[0]):
         at = leader.positions[node]
         held[node] = held[node] and not inside[node] and at != np.floor(at)
@@ -72,8 +72,8 @@ def straighten(points, k, line, pins, others, x_way, y_way):
     would take the node much further: where both faces share next to nothing they may meet at any
     angle, and a node would go a finite way in however short a step.
     """
-    a = min(int(pins.found[k]), line.shape[1] - 2)
-    inwards = -1 if pins.stops[k] else 1
+    a = min(int(pins.later_positions[k]), line.shape[1] - 2)
+    inwards = -1 if pins.ends_facet[k] else 1
     pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
     if not 0.0 < inwards * (others[pin] - k) < 1.0 or others[free] >= 0.0:
         return x_way, y_way
@@ -124,7 +124,7 @@ def is_laid(k, pins, away, length, back, at_end, ends_line):
         )
     else:
         takes = outside < 0.0
-    takes = takes or pins.held[k] or pins.hits[k] >= 0.0
+    takes = takes or pins.held[k] or pins.hit_positions[k] >= 0.0
     return takes and not (ends_line and beside > BESIDE_END_DISTANCE * length)
 
 
@@ -155,7 +155,7 @@ def lay(mover, pins, target, others, how, ways, ends):
     for k in range(last + 1):
         ways[0, k] = 0.0
         ways[1, k] = 0.0
-        found = pins.found[k]
+        found = pins.later_positions[k]
         if found < 0.0:
             continue
         # the way to its foot, across the face there and along it
@@ -175,7 +175,7 @@ def lay(mover, pins, target, others, how, ways, ends):
             continue
         way = (x * x + y * y) ** 0.5
         # what was behind before goes back by a part
-        if pins.hits[k] < 0.0 and pins.positions[k] >= 0.0:
+        if pins.hit_positions[k] < 0.0 and pins.positions[k] >= 0.0:
             was = measure_distance_before(mover, k, target, pins.positions[k])
             if was > MATCHED_NODE_DISTANCE * length:
                 scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)

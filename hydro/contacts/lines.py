@@ -16,8 +16,8 @@ class LineNodes(NamedTuple):
 
     line: at the start of the step; new: at its end; further: after some steps like it; inner: the
     next nodes inwards, at its start; boxes, swept (4, groups): around `group` faces each, of the
-    line and of its way to `further`.  mirrored (2,): is the end on a plane, in which the line goes
-    on as its mirror image?
+    line and of its way to `further`.  mirrored (2,): whether the end is on a plane, in which the
+    line goes on as its mirror image.
     """
 
     line: np.ndarray
@@ -40,17 +40,17 @@ def make_line_nodes(faces: int, group: int) -> LineNodes:
 @compiled_once
 def is_free_end(nodes, position):
     """Whether a position on a line is its first or last node, beyond which it does not go on."""
-    most = nodes.line.shape[1] - 1
+    last_node = nodes.line.shape[1] - 1
     at_start = position == 0.0 and not nodes.mirrored[0]
-    return at_start or (position == most and not nodes.mirrored[1])
+    return at_start or (position == last_node and not nodes.mirrored[1])
 
 
 @compiled_once
 def is_mirrored_end(nodes, position):
     """Whether a position on a line is a node on a plane, with the line's mirror image beyond it."""
-    most = nodes.line.shape[1] - 1
+    last_node = nodes.line.shape[1] - 1
     at_start = position == 0.0 and nodes.mirrored[0]
-    return at_start or (position == most and nodes.mirrored[1])
+    return at_start or (position == last_node and nodes.mirrored[1])
 
 
 class Pins(NamedTuple):
@@ -60,22 +60,22 @@ class Pins(NamedTuple):
     later time; hits: where nodes have come through it in this step, else -1.0.  covered: lies it
     between pins, on one face of the other line?  Of closed facets: held: the contact lays it on the
     other line; inside: it is between two of them; stops: one ends there, counted along the leader.
-    asked: does it count, or have both lines this node?  part: see `may_lie_on`.
+    counts: does it count, or have both lines this node?  part: see `may_lie_on`.
     """
 
     positions: np.ndarray
-    found: np.ndarray
-    hits: np.ndarray
+    later_positions: np.ndarray
+    hit_positions: np.ndarray
     covered: np.ndarray
     held: np.ndarray
     inside: np.ndarray
-    stops: np.ndarray
-    asked: np.ndarray
-    part: int
+    ends_facet: np.ndarray
+    counts: np.ndarray
+    line_part: int
 
 
-def make_pins(nodes: int, part: int) -> Pins:
+def make_pins(nodes: int, line_part: int) -> Pins:
     """No pins yet among so many nodes; all of them count."""
     numbers = (np.full(nodes, -1.0) for _ in range(3))
     marks = (np.zeros(nodes, dtype=np.bool_) for _ in range(4))
-    return Pins(*numbers, *marks, asked=np.ones(nodes, dtype=np.bool_), part=part)
+    return Pins(*numbers, *marks, counts=np.ones(nodes, dtype=np.bool_), line_part=line_part)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.boundary import Piston
 from shockgrid.hydro.contacts.pair import Pair, PlanePair
 from shockgrid.hydro.contacts.parting import Bodies
 from shockgrid.hydro.contacts.start import fill_normals
@@ -27,14 +26,17 @@ from shockgrid.hydro.facets.states import make_add_facet_flux
 from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.links import Link
 from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.perimeter.contacts import PISTON
 from shockgrid.hydro.rim import AT_FACE, RHO_FACE, RHO_TRACE, TRACE
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.regrid.errors import Place, RunFailure
 
 LEAST_STEP = 2e-3  # of the stable step: a touch that comes sooner is taken at its end
-LEAST_BESIDE = 5e-2  # the same where surfaces touch already
-MOST_TOUCH_CUTS = 5  # times that a step is cut to the first touch, and made a little longer again
-MOST_LONGER = 1.5  # a step that was cut too short
+LEAST_STEP_IN_CONTACT = 5e-2  # the same where surfaces touch already
+MOST_TOUCH_RETRIES = (
+    5  # times that a step is cut to the first touch, and made a little longer again
+)
+MOST_LENGTHENING = 1.5  # a step that was cut too short
 # of a step: a touch that comes so shortly before or after its end is at its end
 REACHED_TOUCH_PART = 1e-6
 ROUND_OFF_AXIS_DISTANCE = 1e-12  # of a surface's length: ends so near to the axis are on it
@@ -72,16 +74,17 @@ class Meetings:
         ]
         self.bodies = Bodies(self.surfaces, _find_bodies(blocks, links))
         self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)
-        self.near: list[Pair] = []  # with facets
-        self.touching: list[Pair] = []  # with pins
+        self.with_facets: list[Pair] = []  # with facets
+        self.with_pins: list[Pair] = []  # with pins
         self._met: list[Surface] = []  # that have lain on others
         self._sides: list[Surface] = []  # of the near pairs, and their walls
         self._walls: list[Surface] = []
-        self._found = False  # the present grid's facets?
-        self._room = 0.0  # all lines are further apart; not above 0 if a pair is near
-        self._gone = self._most = 0.0  # clearances are less by what was gone since; in this step
+        self._facets_are_current = False  # the present grid's facets?
+        self._least_clearance = 0.0  # all lines are further apart; not above 0 if a pair is near
+        self._moved_since = 0.0  # by so much clearances may have fallen since they were measured
+        self._largest_motion = 0.0  # of two lines towards each other in this step
         self._read: set[int] = set()  # surfaces whose lines are those of the present grid
-        self._cuts = 0
+        self._touch_retries = 0
         self.made = self.opened = 0
         self.length = 0.0
         self.overlap = 0.0  # of bodies, in cells
@@ -89,7 +92,7 @@ class Meetings:
     def set_in_contact(self) -> bool:
         """Before the first step: lay surfaces on each other that touch but for rounding or chords.
 
-        Has any node moved?
+        Returns whether any node has moved.
         """
         for surface in self.surfaces:
             surface.read()
@@ -98,7 +101,7 @@ class Meetings:
             plane.read()
         for pair in self.pairs:
             pair.find_lying()
-        lying = [pair for pair in self.pairs if pair.touched]
+        lying = [pair for pair in self.pairs if pair.has_hits]
         if not lying:
             return False
         for block in self.blocks:
@@ -118,21 +121,21 @@ class Meetings:
 
         Raises RunFailure where two lines have crossed each other too far to go on.
         """
-        if self.pairs and not self._found:
+        if self.pairs and not self._facets_are_current:
             self._find(step)
-            for pair in self.touching:
+            for pair in self.with_pins:
                 crossing = pair.find_crossing()
                 if crossing:
-                    one, other, node = crossing
-                    x, y = one.line[:, node]
+                    surface, other_surface, node = crossing
+                    x, y = surface.line[:, node]
                     raise RunFailure(
-                        f"contact: {one.segment} has come through {other.segment} at "
+                        f"contact: {surface.segment} has come through {other_surface.segment} at "
                         f"x = {x:.6g} m, y = {y:.6g} m, t = {t:.6g} s (step {step}): the lines "
                         "bend there within a cell",
                         cause="blocks-overlap",
-                        place=Place(one.block.name, side=one.segment.side),
+                        place=Place(surface.block.name, side=surface.segment.side),
                     )
-        blocks = [(pair.leader.block, pair.follower.block) for pair in self.touching]
+        blocks = [(pair.leader.block, pair.follower.block) for pair in self.with_pins]
         return {frozenset(map(id, both)) for both in blocks}
 
     # --- phases of a step ------------------------------------------------------------------------
@@ -141,9 +144,9 @@ class Meetings:
         """Facets of the old grid; ghosts and contact states beside them, from the cells."""
         if not self.pairs:
             return
-        if self.pairs and not self._found:
+        if not self._facets_are_current:
             self._find()
-        if self.near:
+        if self.with_facets:
             self._set_velocities(t)
             for surface in self._solve(AT_FACE):
                 surface.put_cover(RHO_FACE)
@@ -151,77 +154,98 @@ class Meetings:
 
     def fill_speeds(self, t: float, dt: float) -> None:
         """Contact states from the traces, with which the lines move."""
-        if self.near:
+        if self.with_facets:
             self._set_velocities(t)
             for surface in self._solve(TRACE):
                 surface.put_cover(RHO_TRACE)
-            for pair in self.near:
+            for pair in self.with_facets:
                 pair.find_held()
 
     def meet(self, dt: float, stable_dt: float) -> float | None:
-        """Lay the new lines on each other; the other step that ends with the first touch, or None.
+        """Lay the new lines on each other, or return the step [s] that ends with the first touch.
 
         Nodes in contact first, then, where the step is not to be shortened, those that have come
         through the other line in it.
         """
         if not self.pairs:
             return None
-        # which pairs may meet in a step that is somewhat longer than this one
+        awake = self._find_awake_pairs()
+        if not awake:
+            self._touch_retries = 0
+            return None
+        part_back = min(1.0, RETURN_PART * dt / stable_dt)
+        self._lay_pins(awake, part_back)
+        first_touch, proposed_dt = self._find_first_touch(awake, dt, stable_dt)
+        if proposed_dt is not None:
+            return proposed_dt
+        self._lay_hits(awake, first_touch, part_back)
+        # bodies that lie in each other even so
+        if any(pair.has_hits or pair in self.with_pins for pair in awake if not pair.one_body):
+            sound = max(float(surface.segment.rim.c.max()) for surface in self.surfaces)
+            self.bodies.push_apart(self._largest_motion + PUSHED_SOUND_PART * sound * dt)
+        # what that has changed beside them
+        for guard in self.guards:  # of bodies' corners, which the laying may have opened
+            guard.hold()
+        for regridder, pairs in self._folding:
+            regridder.meets_itself = any(pair.has_hits or pair in self.with_pins for pair in pairs)
+        return None
+
+    def _find_awake_pairs(self) -> list[Pair]:
+        """The pairs that may meet in a step that is somewhat longer than this one."""
         for regridder, _ in self._folding:
             regridder.meets_itself = False
         for surface in self.surfaces:
             surface.measure_way()
-        self._most = 2.0 * max(surface.way for surface in self.surfaces)
-        awake = []
-        if MOST_LONGER * self._most >= self._room:
-            for pair in self.pairs:
-                pair.clearance -= self._gone
-            self._gone = 0.0
-            awake = [pair for pair in self.pairs if pair.may_touch(MOST_LONGER)]
-        if not awake:
-            self._cuts = 0
-            return None
-        # nodes that are in contact stay on the other line
+        self._largest_motion = 2.0 * max(surface.largest_displacement for surface in self.surfaces)
+        if MOST_LENGTHENING * self._largest_motion < self._least_clearance:
+            return []
+        for pair in self.pairs:
+            pair.clearance -= self._moved_since
+        self._moved_since = 0.0
+        return [pair for pair in self.pairs if pair.may_touch(MOST_LENGTHENING)]
+
+    def _lay_pins(self, awake: list[Pair], part_back: float) -> None:
+        """Keep the nodes that are in contact on the other line."""
         self._read_lines([s for pair in awake for s in (pair.follower, pair.leader)])
         for surface in self.surfaces:
             surface.read_new()
         for pair in awake:
             pair.forget_hits()
-        part_back = min(1.0, RETURN_PART * dt / stable_dt)
-        self._lay(self.touching, part_back)
+        self._lay(self.with_pins, part_back)
         for surface in self._sides:
             surface.measure_way()
-        # the first touch: a step that ends with it is taken instead, a few times at most
-        stretch = 1.0 if self._cuts == 0 else MOST_LONGER
-        first = min(pair.find_touch(stretch) for pair in awake)
-        least = LEAST_BESIDE if self.touching else LEAST_STEP
-        other = max(first * dt, min(dt, least * stable_dt))
-        misses = (
-            other < (1.0 - REACHED_TOUCH_PART) * dt
-            or (1.0 + REACHED_TOUCH_PART) * dt < other <= MOST_LONGER * dt
+
+    def _find_first_touch(
+        self, awake: list[Pair], dt: float, stable_dt: float
+    ) -> tuple[float, float | None]:
+        """The first touch, in steps, and the step [s] that ends with it, if that is to be taken.
+
+        It is taken a few times at most.
+        """
+        stretch = 1.0 if self._touch_retries == 0 else MOST_LENGTHENING
+        first_touch = min(pair.find_touch(stretch) for pair in awake)
+        least_part = LEAST_STEP_IN_CONTACT if self.with_pins else LEAST_STEP
+        proposed_dt = max(first_touch * dt, min(dt, least_part * stable_dt))
+        ends_off_touch = (
+            proposed_dt < (1.0 - REACHED_TOUCH_PART) * dt
+            or (1.0 + REACHED_TOUCH_PART) * dt < proposed_dt <= MOST_LENGTHENING * dt
         )
-        if misses and self._cuts < MOST_TOUCH_CUTS:
-            self._cuts += 1
-            return other
-        self._cuts = 0
-        # nodes that come through are laid on the other line
-        if first < 1.0 + 2.0 * REACHED_TOUCH_PART or self.touching:
+        if ends_off_touch and self._touch_retries < MOST_TOUCH_RETRIES:
+            self._touch_retries += 1
+            return first_touch, proposed_dt
+        self._touch_retries = 0
+        return first_touch, None
+
+    def _lay_hits(self, awake: list[Pair], first_touch: float, part_back: float) -> None:
+        """Lay the nodes that come through in this step on the other line."""
+        at_end = 1.0 + 2.0 * REACHED_TOUCH_PART
+        if first_touch < at_end or self.with_pins:
             for pair in awake:
-                pair.find_touch(1.0 + 2.0 * REACHED_TOUCH_PART, cuts=False)
+                pair.find_touch(at_end, limits_step=False)
         else:
             for pair in awake:
                 pair.forget_hits()
-        self._lay([pair for pair in awake if pair.touched], part_back)
-        # bodies that lie in each other even so
-        if any(pair.touched or pair in self.touching for pair in awake if not pair.one_body):
-            sound = max(float(surface.segment.rim.c.max()) for surface in self.surfaces)
-            self.bodies.push_apart(self._most + PUSHED_SOUND_PART * sound * dt)
-        # what that has changed beside them
-        for guard in self.guards:  # of bodies' corners, which the laying may have opened
-            guard.hold()
-        for regridder, pairs in self._folding:
-            regridder.meets_itself = any(pair.touched or pair in self.touching for pair in pairs)
-        return None
+        self._lay([pair for pair in awake if pair.has_hits], part_back)
 
     def _lay(self, pairs: list[Pair], part_back: float) -> None:
         for pair in pairs:
@@ -256,19 +280,19 @@ class Meetings:
         """Move the new nodes at a surface's ends on, with all that meets there."""
         if not shifts[:, 0].any():
             return
-        for (asked, *way), key_node in zip(shifts, surface.ends, strict=True):
-            if not asked or key_node is None or key_node.given or key_node.is_tied:
+        for (is_shifted, *shift), key_node in zip(shifts, surface.ends, strict=True):
+            if not is_shifted or key_node is None or key_node.given or key_node.is_tied:
                 continue
-            key_node.shift(_turn_into_wall(np.array(way), key_node.find_wall()))
+            key_node.shift(_turn_into_wall(np.array(shift), key_node.find_wall()))
             if self.geometry.curved:
                 key_node.put_on_axis(ROUND_OFF_AXIS_DISTANCE * surface.length)
-            for other in self.surfaces:
-                if key_node in other.ends:
-                    other.read_new()
+            for other_surface in self.surfaces:
+                if key_node in other_surface.ends:
+                    other_surface.read_new()
 
     def fill_fluxes(self, t: float, dt: float) -> None:
         """Add the fluxes through closed facets to those of the free surfaces."""
-        if self.near:
+        if self.with_facets:
             self._fill_facet_fluxes(t, dt)
         for surface in self._met:
             surface.flow_along()
@@ -277,12 +301,12 @@ class Meetings:
         self._set_velocities(t)
         for surface in (*self._sides, *self._walls):
             surface.read_middle()
-        for pair in self.near:
-            pair.cut_middle(dt)
+        for pair in self.with_facets:
+            pair.fill_mid_time_facets(dt)
         self._solve(TRACE, middle=True)
         for surface in self._sides:
             surface.read_flux()
-        for pair in self.near:
+        for pair in self.with_facets:
             for side, surface in ((LEADER, pair.leader), (FOLLOWER, pair.follower)):
                 if not surface.rigid:
                     self.add_facet_flux.entry(pair.facets, pair.count, side, surface.arrays)
@@ -295,15 +319,15 @@ class Meetings:
         """The step stands: count what closed and opened, and how far lines may have come."""
         if not self.pairs:
             return
-        self._found = False
+        self._facets_are_current = False
         self.length = 0.0
         self.overlap = 0.0
-        if MOST_LONGER * self._most < self._room:
-            self._room -= self._most
-            self._gone += self._most
+        if MOST_LENGTHENING * self._largest_motion < self._least_clearance:
+            self._least_clearance -= self._largest_motion
+            self._moved_since += self._largest_motion
             return
         for pair in self.pairs:
-            pair.clearance -= pair.leader.way + pair.follower.way
+            pair.clearance -= pair.leader.largest_displacement + pair.follower.largest_displacement
             stretches = 0
             if pair.is_near:
                 stretches, length = pair.measure_closed()
@@ -312,11 +336,11 @@ class Meetings:
             self.opened += max(0, pair.stretches - stretches)
             pair.stretches = stretches
         self._measure_overlaps()
-        self._room = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
+        self._least_clearance = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
 
     def _measure_overlaps(self) -> None:
         """How much of bodies lies in others, all pairs together, in cells of the finer of both."""
-        met = [pair for pair in self.pairs if pair.touched or pair in self.touching]
+        met = [pair for pair in self.pairs if pair.has_hits or pair in self.with_pins]
         pairs = [pair for pair in met if not isinstance(pair, PlanePair)]
         for surface in {s for pair in pairs for s in (pair.leader, pair.follower)}:
             surface.read_accepted()
@@ -336,24 +360,24 @@ class Meetings:
 
     def _find(self, step: int = 0) -> None:
         self._read.clear()
-        for pair in self.pairs if self._room <= 0.0 else ():
+        for pair in self.pairs if self._least_clearance <= 0.0 else ():
             if pair.is_near or pair.clearance <= 0.0:
                 self._read_lines((pair.follower, pair.leader))
                 pair.find()
         near = [pair for pair in self.pairs if pair.is_near]
-        self.near = [pair for pair in near if pair.count]
-        self.touching = [pair for pair in near if pair.touches]
-        sides = {id(s) for pair in self.near for s in (pair.leader, pair.follower)}
+        self.with_facets = [pair for pair in near if pair.count]
+        self.with_pins = [pair for pair in near if pair.has_pins]
+        sides = {id(s) for pair in self.with_facets for s in (pair.leader, pair.follower)}
         self._sides = [s for s in self.surfaces if id(s) in sides and not s.rigid]
         self._walls = [s for s in self.surfaces if id(s) in sides and s.rigid]
-        met = {id(s.block) for pair in self.touching for s in (pair.leader, pair.follower)}
+        met = {id(s.block) for pair in self.with_pins for s in (pair.leader, pair.follower)}
         for surface in self.surfaces:
             if id(surface.block) in met and not surface.rigid:
                 surface.meet(self._moving_sides)
         self._met = [surface for surface in self.surfaces if surface.has_met]
         self._hold_nodes()
-        self._found = True
-        if self.voids.are_due(step, bool(self.near)):
+        self._facets_are_current = True
+        if self.voids.are_due(step, bool(self.with_facets)):
             self._read_lines((*self.surfaces, *self.planes))
             self.voids.find()
 
@@ -361,14 +385,14 @@ class Meetings:
         """Mark the nodes that lie on other surfaces: their waves do not decay by themselves."""
         for surface in self._met:
             surface.free_nodes()
-        for pair in self.touching:
+        for pair in self.with_pins:
             for half, _ in pair.halves:
                 if not half.surface.rigid:
                     half.surface.hold_nodes((half.pins.positions >= 0.0) | half.pins.covered)
 
     def _set_velocities(self, t: float) -> None:
         for surface in self.surfaces:
-            if isinstance(surface.segment, Piston):
+            if surface.segment.wall == PISTON:
                 surface.arrays.velocity[:] = surface.segment.velocity(t)
 
     def _solve(self, rows: slice, middle: bool = False) -> list[Surface]:
@@ -380,7 +404,7 @@ class Meetings:
             surface.read_states(rows, surface.middle if middle else surface.line)
             if not middle:
                 surface.arrays.sums[:] = 0.0  # nothing covers the faces yet
-        for pair in self.near:
+        for pair in self.with_facets:
             pair.solve(cover=not middle)
         return [surface for surface in self._sides if surface.arrays.sums[WEIGHT].any()]
 
@@ -411,17 +435,17 @@ class Meetings:
         }
         return {"contacts/counts": counts, **measured} | self.voids.get_state()
 
-    def get_state_for(self, other: Meetings) -> dict[str, Any]:
+    def get_state_for(self, other_meetings: Meetings) -> dict[str, Any]:
         """The same for a simulation of the same surfaces, with other numbers of faces."""
-        if not self.pairs or len(self.pairs) != len(other.pairs):
+        if not self.pairs or len(self.pairs) != len(other_meetings.pairs):
             return {}
-        return self.get_state() | self.voids.get_state_for(other.voids)
+        return self.get_state() | self.voids.get_state_for(other_meetings.voids)
 
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
-        self._found = False
-        self._room = 0.0
-        self._gone = 0.0
+        self._facets_are_current = False
+        self._least_clearance = 0.0
+        self._moved_since = 0.0
         for pair in self.pairs:
             pair.clearance = 0.0
             pair.is_near = False
@@ -476,19 +500,19 @@ def _find_pairs(
     ]
     pairs: list[Pair] = []
     # pairs of surfaces, the longest and walls first
-    for one, other in itertools.combinations_with_replacement(surfaces, 2):
-        if one.rigid and other.rigid:
+    for surface, other_surface in itertools.combinations_with_replacement(surfaces, 2):
+        if surface.rigid and other_surface.rigid:
             continue
-        one_body = bodies[id(one.block)] == bodies[id(other.block)]
-        if one_body and (one.at_sliding_contact or other.at_sliding_contact):
+        one_body = bodies[id(surface.block)] == bodies[id(other_surface.block)]
+        if one_body and (surface.at_sliding_contact or other_surface.at_sliding_contact):
             continue  # what closes there is the sliding contact
-        pairs.append(Pair(one, other, one_body, geometry.curved))
+        pairs.append(Pair(surface, other_surface, one_body, geometry.curved))
     pairs.sort(key=lambda pair: (not pair.leader.rigid, -pair.leader.length))
     # lines that end on planes go on as their mirror images there
     for surface in surfaces:
         for end, node in enumerate(surface.ends):
-            held = node is not None and any(plane.holds(node) for plane in planes)
-            surface.nodes.mirrored[end] = held
+            is_held = node is not None and any(plane.holds(node) for plane in planes)
+            surface.nodes.mirrored[end] = is_held
     # and planes with each free surface
     free = [surface for surface in surfaces if not surface.rigid]
     pairs += [
@@ -499,12 +523,12 @@ def _find_pairs(
     return surfaces, pairs
 
 
-def _turn_into_wall(way: np.ndarray, walls: tuple[int, float, float]) -> np.ndarray:
-    """The way along a wall that gets a node as far across the line as `way` does."""
+def _turn_into_wall(shift: np.ndarray, walls: tuple[int, float, float]) -> np.ndarray:
+    """The way along a wall that gets a node as far across the line as `shift` does."""
     number, x, y = walls
     if number == 0:
-        return way
-    along = float(way[1] * x - way[0] * y)
-    if number > 1 or along == 0.0 or along * along < 0.1 * float(way @ way):
+        return shift
+    along = float(shift[1] * x - shift[0] * y)
+    if number > 1 or along == 0.0 or along * along < 0.1 * float(shift @ shift):
         return np.zeros(2)
-    return np.array([-y, x]) * (float(way @ way) / along)
+    return np.array([-y, x]) * (float(shift @ shift) / along)

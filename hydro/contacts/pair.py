@@ -37,6 +37,7 @@ from shockgrid.hydro.facets.lines import fill_radius_weighted_areas
 from shockgrid.hydro.facets.rows import make_facets
 from shockgrid.hydro.facets.states import solve_facets, sum_over_faces
 from shockgrid.hydro.motion.overlaps import is_inside
+from shockgrid.hydro.rows import END_INDEX
 from shockgrid.regrid.errors import Place, RegridFailure
 
 DEEPEST_FACES = 2.0  # longest faces: so far behind a line nodes are looked for
@@ -49,17 +50,19 @@ FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for
 class Half:
     """One line of a pair: its surface, and what its nodes have to do with the other line."""
 
-    def __init__(self, surface: Surface, part: int):
+    def __init__(self, surface: Surface, line_part: int):
         self.surface = surface
-        self.pins = make_pins(surface.count + 1, part)
+        self.pins = make_pins(surface.count + 1, line_part)
 
-    def count_common(self, other: Half) -> int:
+    def count_common(self, other_half: Half) -> int:
         """How many nodes, at its ends, both lines have; from now on they do not count."""
-        is_one = other.surface is self.surface
+        is_one = other_half.surface is self.surface
         for end, key_node in enumerate(self.surface.ends):
-            others = (self.surface.ends[1 - end],) if is_one else other.surface.ends
-            self.pins.asked[-end] = key_node is None or not any(key_node is node for node in others)
-        return int((~self.pins.asked).sum())
+            other_ends = (self.surface.ends[1 - end],) if is_one else other_half.surface.ends
+            self.pins.counts[END_INDEX[end]] = key_node is None or not any(
+                key_node is node for node in other_ends
+            )
+        return int((~self.pins.counts).sum())
 
     def forget_pins(self) -> None:
         """No node lies on the other line."""
@@ -70,75 +73,83 @@ class Half:
         """No facet is closed that would lay nodes on the other line."""
         self.pins.held.fill(False)
         self.pins.inside.fill(False)
-        self.pins.stops.fill(False)
+        self.pins.ends_facet.fill(False)
 
-    def find_pins(self, other: Half, one_body: bool) -> int:
-        """The nodes that lie on the other line; how many."""
-        surface = other.surface
+    def find_pins(self, other_half: Half, one_body: bool) -> int:
+        """Find the nodes that lie on the other line; returns how many."""
+        surface = other_half.surface
         return find_pins.entry(
             self.surface.nodes, surface.nodes, self.pins, ON_LINE_DISTANCE,
             MOST_BULGE * surface.longest, one_body,
         )  # fmt: skip
 
-    def find_touch(self, other: Half, cuts: bool) -> float:
+    def find_touch(self, other_half: Half, limits_step: bool) -> float:
         """When a node comes through the other line; see `find_touches`."""
         return find_touches.entry(
-            self.surface.nodes, self.pins, other.surface.nodes, other.pins.positions, cuts
+            self.surface.nodes,
+            self.pins,
+            other_half.surface.nodes,
+            other_half.pins.positions,
+            limits_step,
         )
 
 
 class Pair:
     """A leader, whose line holds where both lie on each other, and a follower.
 
-    A line that meets itself is both: nodes of its later part follow.  `lead`, `follow`: both
-    halves.  `clearance`: a distance by which the lines are apart at least [m], not above 0 where it
-    must be measured.  bond [Pa], friction: what the contact holds.
+    A line that meets itself is both: nodes of its later part follow.  `leader_half`,
+    `follower_half`: what belongs to each.  `clearance`: a distance by which the lines are apart at
+    least [m], not above 0 where it must be measured.  bond [Pa], friction: what the contact holds.
     """
 
-    straight = False  # is the leader a plane?
+    straight = False  # whether the leader is a plane
 
-    def __init__(self, one: Surface, other: Surface, one_body: bool = False, curved: bool = False):
-        first = one.rigid or (not other.rigid and one.length >= other.length)
-        leader, follower = (one, other) if first else (other, one)
-        self.bond = min(one.bond, other.bond)
-        self.friction = min(one.friction, other.friction)
+    def __init__(
+        self, surface: Surface, other_surface: Surface, one_body: bool = False, curved: bool = False
+    ):
+        surface_leads = surface.rigid or (
+            not other_surface.rigid and surface.length >= other_surface.length
+        )
+        leader, follower = (surface, other_surface) if surface_leads else (other_surface, surface)
+        self.bond = min(surface.bond, other_surface.bond)
+        self.friction = min(surface.friction, other_surface.friction)
         self.one_body = one_body
-        self.one_block = one.block if one.block is other.block else None
-        self.is_one = one is other
-        self.lead = Half(leader, EARLIER if self.is_one else BOTH)
-        self.follow = Half(follower, LATER if self.is_one else BOTH)
+        self.one_block = surface.block if surface.block is other_surface.block else None
+        self.is_one = surface is other_surface
+        self.leader_half = Half(leader, EARLIER if self.is_one else BOTH)
+        self.follower_half = Half(follower, LATER if self.is_one else BOTH)
         self.clearance = 0.0
         self.is_near = False
         self.stretches = 0  # that are closed
-        self.touched = False  # does a node of one come through the other in this step?
+        self.has_hits = False  # whether a node of one comes through the other in this step
         self.count = self.closed = self.pinned = 0
         self.common = self._count_common()  # pins at shared ends
-        most = leader.count + follower.count + 2
+        most_facets = leader.count + follower.count + 2
         self.curved = curved
-        self.facets = make_facets(most, curved)
-        self._sorted_pins = np.empty((6, most))
-        self._covered = np.zeros(leader.count + 1, dtype=np.bool_)  # at mid-time, which nobody asks
-        self._still = np.zeros((2, leader.count + 1))
-        self._ways = np.empty((2, most))
+        self.facets = make_facets(most_facets, curved)
+        self._sorted_pins = np.empty((6, most_facets))
+        self._covered = np.zeros(leader.count + 1, dtype=np.bool_)  # at mid-time, not read
+        self._no_displacement = np.zeros((2, leader.count + 1))
+        self._shift_scratch = np.empty((2, most_facets))
         self.shifts = np.zeros((4, 3))
 
     @property
     def leader(self) -> Surface:
         """The surface whose line holds."""
-        return self.lead.surface
+        return self.leader_half.surface
 
     @property
     def follower(self) -> Surface:
         """The surface that is laid on it."""
-        return self.follow.surface
+        return self.follower_half.surface
 
     @property
     def halves(self) -> tuple[tuple[Half, Half], tuple[Half, Half]]:
         """Each half with the other one, the follower first."""
-        return (self.follow, self.lead), (self.lead, self.follow)
+        return (self.follower_half, self.leader_half), (self.leader_half, self.follower_half)
 
     def _count_common(self) -> int:
-        common = sum([half.count_common(other) for half, other in self.halves])
+        common = sum([half.count_common(other_half) for half, other_half in self.halves])
         return common if self.one_body else 0
 
     # --- where they lie on each other ------------------------------------------------------------
@@ -146,50 +157,54 @@ class Pair:
     def find(self) -> None:
         """Facets of the old grid."""
         # near each other? the clearance tells, or pins of the last step
-        lay = self.touches  # then they will do so still, which pins tell
-        if self.clearance <= 0.0 and not lay:
+        had_pins = self.has_pins  # then they lie on each other still, which new pins confirm
+        if self.clearance <= 0.0 and not had_pins:
             self.clearance = self._measure_clearance()
         self.count = self.closed = self.pinned = 0
         self.is_near = self.clearance <= 0.0
         if self.is_near:
             self.pinned = self._find_pins()
-        if self.is_near and lay and not self.touches:
+        if self.is_near and had_pins and not self.has_pins:
             self.clearance = self._measure_clearance()
             self.is_near = self.clearance <= 0.0
         # apart: nothing is kept
         if not self.is_near:
             self.pinned = 0
-            self.follow.forget_pins()
-            self.lead.forget_pins()
+            self.follower_half.forget_pins()
+            self.leader_half.forget_pins()
             return
         # facets between the pins
         if self.pinned > 1:
-            line = self.leader.line
-            other = self.follower.line
-            positions = self.follow.pins.positions, self.lead.pins.positions
-            self._cut(line, other, positions, self.lead.pins.covered)
-            self._measure(line, other, self._still, 0.0)
+            leader_line = self.leader.line
+            follower_line = self.follower.line
+            positions = self.follower_half.pins.positions, self.leader_half.pins.positions
+            self._fill_facets(leader_line, follower_line, positions, self.leader_half.pins.covered)
+            self._measure(leader_line, follower_line, self._no_displacement, 0.0)
         else:
-            self.lead.pins.covered.fill(False)
+            self.leader_half.pins.covered.fill(False)
         if not self.count:
             for half, _ in self.halves:
                 half.forget_laying()
 
     def _find_pins(self) -> int:
-        return sum([half.find_pins(other, self.one_body) for half, other in self.halves])
+        return sum([half.find_pins(other_half, self.one_body) for half, other_half in self.halves])
 
     def find_crossing(self) -> tuple[Surface, Surface, int] | None:
         """A surface, the other one and the node of the first that is deep behind it, or None."""
         if self.one_body:
             return None  # what is behind a surface may be the other side of a film
         for half, other_half in reversed(self.halves):
-            one = half.surface
-            other = other_half.surface
-            reach = 2.0 * MOST_BEHIND * other.longest
-            depth, node = find_deepest.entry(one.nodes, other.nodes, half.pins.positions, reach)
+            surface = half.surface
+            other_surface = other_half.surface
+            reach = 2.0 * MOST_BEHIND * other_surface.longest
+            depth, node = find_deepest.entry(
+                surface.nodes, other_surface.nodes, half.pins.positions, reach
+            )
             # behind a line, yet beyond the other side of a thin body, is not in it
-            if depth > MOST_BEHIND and is_inside(tuple(one.line[:, node]), other.block.nodes):
-                return one, other, int(node)
+            if depth > MOST_BEHIND and is_inside(
+                tuple(surface.line[:, node]), other_surface.block.nodes
+            ):
+                return surface, other_surface, int(node)
         return None
 
     def measure_overlap(self) -> float:
@@ -201,40 +216,46 @@ class Pair:
         if self.one_body:
             return 0.0
         areas = []
-        for half, other in self.halves:
-            one = half.surface
-            behind = other.surface
-            reach = DEEPEST_FACES * behind.longest + one.way + behind.way
-            depths = np.empty(one.count + 1)
-            measure_depths.entry(one.nodes, behind.nodes, reach, depths)
+        for half, other_half in self.halves:
+            surface = half.surface
+            other_surface = other_half.surface
+            reach = (
+                DEEPEST_FACES * other_surface.longest
+                + surface.largest_displacement
+                + other_surface.largest_displacement
+            )
+            depths = np.empty(surface.count + 1)
+            measure_depths.entry(surface.nodes, other_surface.nodes, reach, depths)
             # behind a line, yet beyond the other side of a thin body, is not in it
-            for node in np.flatnonzero(depths > DOUBTED_DEPTH_PART * behind.longest):
-                if not is_inside(tuple(one.new[:, node]), behind.block.nodes):
+            for node in np.flatnonzero(depths > DOUBTED_DEPTH_PART * other_surface.longest):
+                if not is_inside(tuple(surface.new[:, node]), other_surface.block.nodes):
                     depths[node] *= -1.0
-            areas.append(sum_behind(one.new, depths))
+            areas.append(sum_behind(surface.new, depths))
         return max(areas)
 
     def _measure_clearance(self) -> float:
         longest = max(self.leader.longest, self.follower.longest)
         width = MOST_BULGE * longest
-        most = FAR_SEARCH_FACES * longest if self.one_body else np.inf
-        near = np.inf
-        for half, other in self.halves[:1] if self.is_one else self.halves:
-            if near > width:
-                found = measure_distance.entry(
-                    half.surface.nodes, other.surface.nodes, half.pins, self.one_body, most
+        farthest = FAR_SEARCH_FACES * longest if self.one_body else np.inf
+        distance = np.inf
+        for half, other_half in self.halves[:1] if self.is_one else self.halves:
+            if distance > width:
+                distance_of_half = measure_distance.entry(
+                    half.surface.nodes, other_half.surface.nodes, half.pins, self.one_body, farthest
                 )
-                near = min(near, found)
-        return near - width
+                distance = min(distance, distance_of_half)
+        return distance - width
 
-    def _cut(self, leader, follower, positions, covered) -> None:
+    def _fill_facets(self, leader, follower, positions, covered) -> None:
         self.count = fill_facets.entry(
             leader, follower, *positions, self.straight, self._sorted_pins, covered, self.facets
         )
 
-    def _measure(self, line, other, moved, inverse_dt) -> None:
+    def _measure(self, leader, follower, displacement, inverse_dt) -> None:
         rigid = self.leader.rigid
-        measure_facets.entry(line, other, rigid, moved, inverse_dt, self.facets, self.count)
+        measure_facets.entry(
+            leader, follower, rigid, displacement, inverse_dt, self.facets, self.count
+        )
 
     # --- what passes -----------------------------------------------------------------------------
 
@@ -255,22 +276,28 @@ class Pair:
         sides = [(side.gather_cells(), side.arrays) for side in (self.leader, self.follower)]
         add_friction.entry(*sides, self.facets, self.count, self.friction, dt)
 
-    def cut_middle(self, dt: float) -> None:
+    def fill_mid_time_facets(self, dt: float) -> None:
         """Facets at mid-time, both grids being known."""
         leader = self.leader
-        for half, other in self.halves:
-            self._follow(half, half.surface.middle, other.surface.middle, half.pins.positions)
-        found = self.follow.pins.found, self.lead.pins.found
-        self._cut(leader.middle, self.follower.middle, found, self._covered)
+        for half, other_half in self.halves:
+            self._update_later_positions(
+                half, half.surface.middle, other_half.surface.middle, half.pins.positions
+            )
+        later_positions = (
+            self.follower_half.pins.later_positions,
+            self.leader_half.pins.later_positions,
+        )
+        self._fill_facets(leader.middle, self.follower.middle, later_positions, self._covered)
         self._measure(leader.middle, self.follower.middle, leader.moved, 1.0 / dt)
         if self.curved:
             fill_radius_weighted_areas.entry(
                 leader.line, leader.new, 1.0, 1.0 / dt, self.facets, self.count
             )
 
-    def _follow(self, half: Half, points, line, positions) -> None:
-        """Fill `found` of the half's pins: positions of the points on a line near the old ones."""
-        follow_pins(points, line, positions, half.pins.part, half.pins.found)
+    def _update_later_positions(self, half: Half, points, line, positions) -> None:
+        """Fill `later_positions` of the half's pins: positions of the points on a line near the old
+        ones."""
+        follow_pins(points, line, positions, half.pins.line_part, half.pins.later_positions)
 
     def measure_closed(self) -> tuple[int, float]:
         """Closed stretches and their length."""
@@ -280,9 +307,9 @@ class Pair:
 
     def forget_hits(self) -> None:
         """No node has come through the other line yet."""
-        self.follow.pins.hits.fill(-1.0)
-        self.lead.pins.hits.fill(-1.0)
-        self.touched = False
+        self.follower_half.pins.hit_positions.fill(-1.0)
+        self.leader_half.pins.hit_positions.fill(-1.0)
+        self.has_hits = False
 
     def find_lying(self) -> None:
         """At the start: nodes of the follower that lie on the leader but for rounding or chords.
@@ -292,52 +319,54 @@ class Pair:
         self.forget_hits()
         if self.one_body:
             return
-        one = self.leader
-        other = self.follower
-        one_sizes = measure_sizes(one.line, one.inner)
-        other_sizes = measure_sizes(other.line, other.inner)
-        hits = self.follow.pins.hits
-        hits[:] = find_lying(other.line, other_sizes, one.line, one_sizes)
+        leader = self.leader
+        follower = self.follower
+        leader_sizes = measure_sizes(leader.line, leader.inner)
+        follower_sizes = measure_sizes(follower.line, follower.inner)
+        hit_positions = self.follower_half.pins.hit_positions
+        hit_positions[:] = find_lying(follower.line, follower_sizes, leader.line, leader_sizes)
         ends = [0, -1]
-        found = find_lying(one.line[:, ends], one_sizes[ends], other.line, other_sizes)
-        self.lead.pins.hits[ends] = found
-        self.touched = bool((hits >= 0.0).any() or (found >= 0.0).any())
+        lying_ends = find_lying(
+            leader.line[:, ends], leader_sizes[ends], follower.line, follower_sizes
+        )
+        self.leader_half.pins.hit_positions[ends] = lying_ends
+        self.has_hits = bool((hit_positions >= 0.0).any() or (lying_ends >= 0.0).any())
 
     def may_touch(self, stretch: float) -> bool:
         """Whether nodes of one may come to the other within so many steps as long as this one."""
-        ways = self.leader.way + self.follower.way
-        return self.is_near or self.clearance <= stretch * ways
+        displacements = self.leader.largest_displacement + self.follower.largest_displacement
+        return self.is_near or self.clearance <= stretch * displacements
 
-    def find_touch(self, stretch: float, cuts: bool = True) -> float:
+    def find_touch(self, stretch: float, limits_step: bool = True) -> float:
         """When, in steps, a node of one line comes through the other; 2 `stretch` where none does.
 
-        Looked at are the first `stretch` steps of motions that go on as in this one.  With `cuts`
-        nodes close to a pin on their own line are left out: the pin is laid in every step, and
-        takes them with it.  Steps that were cut to them would get shorter without end.
+        Looked at are the first `stretch` steps of motions that go on as in this one.  With
+        `limits_step` nodes close to a pin on their own line are left out: the pin is laid in every
+        step, and takes them with it.  Steps that were cut to them would get shorter without end.
         """
         self.forget_hits()
         if not self.may_touch(stretch):
             return 2.0 * stretch
-        first = self._find_touch(stretch, cuts)
-        self.touched = first <= 1.0
-        return stretch * first
+        first_touch = self._find_touch(stretch, limits_step)
+        self.has_hits = first_touch <= 1.0
+        return stretch * first_touch
 
     @property
-    def touches(self) -> bool:
+    def has_pins(self) -> bool:
         """Whether the lines lie on each other, and not only at common ends."""
         return self.is_near and self.pinned > self.common
 
-    def _find_touch(self, stretch: float, cuts: bool) -> float:
+    def _find_touch(self, stretch: float, limits_step: bool) -> float:
         for half, _ in reversed(self.halves):
             surface = half.surface
-            surface.stretch(stretch)
+            surface.extrapolate(stretch)
             nodes = surface.nodes
             fill_swept_boxes(nodes.line, nodes.further, surface.group, nodes.swept)
-        return min([half.find_touch(other, cuts) for half, other in self.halves])
+        return min([half.find_touch(other_half, limits_step) for half, other_half in self.halves])
 
     def find_held(self) -> None:
         """Mark the nodes that the contact lays on the other line."""
-        find_held.entry(self.facets, self.count, self.lead.pins, self.follow.pins)
+        find_held.entry(self.facets, self.count, self.leader_half.pins, self.follower_half.pins)
 
     def match(self) -> int:
         """Let new nodes of both lines that meet go half of the way each; how many have met.
@@ -345,14 +374,16 @@ class Pair:
         The ends' ways are in `shifts`, the follower's first.  Raises RegridFailure where one has
         gone far.
         """
-        pins = self.follow.pins
-        places = np.maximum(pins.positions, pins.hits)
-        one = self.follower.new
-        other = self.leader.new
-        met = match(one, other, places, pins.hits, pins.held, self.shifts)
-        if met < 0:
+        pins = self.follower_half.pins
+        places = np.maximum(pins.positions, pins.hit_positions)
+        follower_line = self.follower.new
+        leader_line = self.leader.new
+        matched = match(
+            follower_line, leader_line, places, pins.hit_positions, pins.held, self.shifts
+        )
+        if matched < 0:
             raise self._tell_lost(self.follower)
-        return met
+        return matched
 
     def _tell_lost(self, mover: Surface) -> RegridFailure:
         return RegridFailure(
@@ -368,14 +399,16 @@ class Pair:
         Those of the closed part, and those that have come through.  How many inner nodes moved;
         the ends' ways are in `shifts`.  Raises RegridFailure where one has gone far.
         """
-        half, other = self.halves[int(back)]
+        half, other_half = self.halves[int(back)]
         pins = half.pins
         mover = half.surface
-        target = other.surface
-        self._follow(half, mover.new, target.new, np.maximum(pins.positions, pins.hits))
+        target = other_half.surface
+        self._update_later_positions(
+            half, mover.new, target.new, np.maximum(pins.positions, pins.hit_positions)
+        )
         moved = lay.entry(
-            mover.nodes, pins, target.nodes, other.pins.positions,
-            (back, self.straight, part_back), self._ways, self.shifts[:2],
+            mover.nodes, pins, target.nodes, other_half.pins.positions,
+            (back, self.straight, part_back), self._shift_scratch, self.shifts[:2],
         )  # fmt: skip
         if moved < 0:
             raise self._tell_lost(mover)
@@ -392,41 +425,45 @@ class PlanePair(Pair):
         super().__init__(plane, surface, curved=curved)  # type: ignore[arg-type]
 
     def _count_common(self):
-        asked = self.follow.pins.asked
+        counts = self.follower_half.pins.counts
         for end, key_node in enumerate(self.follower.ends):
-            asked[-end] = key_node is None or not self.plane.holds(key_node)
-        return int((~asked).sum())
+            counts[END_INDEX[end]] = key_node is None or not self.plane.holds(key_node)
+        return int((~counts).sum())
 
     def find_lying(self):
         """The nodes that lie on the plane but for rounding."""
         self.forget_hits()
-        other = self.follower
-        sizes = measure_sizes(other.line, other.inner)
-        hits = self.follow.pins.hits
-        hits[:] = find_lying_on_plane(other.line, sizes, self.plane.line)
-        self.touched = bool((hits >= 0.0).any())
+        follower = self.follower
+        sizes = measure_sizes(follower.line, follower.inner)
+        hit_positions = self.follower_half.pins.hit_positions
+        hit_positions[:] = find_lying_on_plane(follower.line, sizes, self.plane.line)
+        self.has_hits = bool((hit_positions >= 0.0).any())
 
     def _measure_clearance(self):
         return measure_clearance_of_plane(
-            self.follower.line, self.plane.line, self.follow.pins.asked
+            self.follower.line, self.plane.line, self.follower_half.pins.counts
         )
 
     def _find_pins(self):
         return find_plane_pins(
-            self.follower.line, self.plane.line, ON_LINE_DISTANCE, self.follow.pins.positions
+            self.follower.line, self.plane.line, ON_LINE_DISTANCE, self.follower_half.pins.positions
         )
 
     def find_crossing(self):
         return None
 
-    def _follow(self, half, points, line, positions):
-        if half is self.follow:
-            follow_plane(points, line, positions, half.pins.found)
+    def _update_later_positions(self, half, points, line, positions):
+        if half is self.follower_half:
+            follow_plane(points, line, positions, half.pins.later_positions)
 
-    def _find_touch(self, stretch, cuts):
-        other = self.follower
-        other.stretch(stretch)
-        pins = self.follow.pins
+    def _find_touch(self, stretch, limits_step):
+        follower = self.follower
+        follower.extrapolate(stretch)
+        pins = self.follower_half.pins
         return find_plane_touches(
-            other.line, other.nodes.further, pins.positions, self.plane.line, pins.hits
+            follower.line,
+            follower.nodes.further,
+            pins.positions,
+            self.plane.line,
+            pins.hit_positions,
         )

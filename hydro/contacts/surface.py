@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shockgrid.hydro.block import Block
-from shockgrid.hydro.boundary import Axis, FreeSurface, Piston, Segment, Wall
+from shockgrid.hydro.boundary import Segment
 from shockgrid.hydro.contacts.friction import cover_surface
 from shockgrid.hydro.contacts.laying import fit_plane
 from shockgrid.hydro.contacts.lines import make_line_nodes
@@ -18,7 +18,7 @@ from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Role
 from shockgrid.hydro.motion.sides import Sides
 from shockgrid.hydro.motion.smoothing import SurfaceLine
-from shockgrid.hydro.perimeter.contacts import fill_ghosts_from_faces, flow_along
+from shockgrid.hydro.perimeter.contacts import PISTON, fill_ghosts_from_faces, flow_along
 from shockgrid.hydro.rim import FLUX, LENGTH, P_STAR, RHO, SWEPT, VOID_P
 from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes
 from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
@@ -33,7 +33,7 @@ class Surface:
     def __init__(self, segment: Segment, sides: Sides):
         self.segment = segment
         self.block = segment.block
-        self.rigid = isinstance(segment, Wall)
+        self.rigid = segment.is_rigid
         self.count = segment.last - segment.first
         self.side = SIDE_NAMES.index(segment.side)
         self.back = segment.side in ("i_min", "j_max")
@@ -51,7 +51,7 @@ class Surface:
         self.arrays = make_line_arrays(laws, self.rigid)
         self.bond = np.inf if self.rigid else float(getattr(segment, "bond", 0.0))
         self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
-        self.way = 0.0  # of the node that goes furthest in this step
+        self.largest_displacement = 0.0  # of the node that goes furthest in this step
         self.thick: SurfaceLine | None = None  # once it has met another one
         self.moving_line = next(line for line in sides.lines if line.segment is segment)
         self.read()
@@ -60,8 +60,8 @@ class Surface:
 
     def _find_key_node(self, key_nodes: list[KeyNode], node: int) -> KeyNode | None:
         """The key node at the line's first or last node."""
-        at = self.segment.stop - node if self.back else self.segment.start + node
-        i, j = find_node(self.side, at, 0, self.block.ni, self.block.nj)
+        place = self.segment.stop - node if self.back else self.segment.start + node
+        i, j = find_node(self.side, place, 0, self.block.ni, self.block.nj)
         for key_node in key_nodes:
             if any(b is self.block and (p, q) == (i, j) for b, p, q in key_node.members):
                 return key_node
@@ -127,18 +127,20 @@ class Surface:
         self.middle *= 0.5
         np.subtract(self.new, self.line, out=self.moved)
 
-    def stretch(self, stretch: float) -> None:
+    def extrapolate(self, steps: float) -> None:
         """Fill `further`, the nodes after so many steps as this one."""
         further = self.nodes.further
         np.subtract(self.new, self.line, out=further)
-        further *= stretch
+        further *= steps
         further += self.line
 
     def measure_way(self) -> None:
-        """How far the node goes in this step that goes furthest, into `way`."""
+        """How far the node goes in this step that goes furthest, into `largest_displacement`."""
         segment = self.segment
         block = self.block
-        self.way = measure_way(block.nodes, block.nodes_new, self.side, segment.start, segment.stop)
+        self.largest_displacement = measure_way(
+            block.nodes, block.nodes_new, self.side, segment.start, segment.stop
+        )
 
     def write_new(self) -> None:
         """Write the line's inner nodes into the block's new ones."""
@@ -267,9 +269,7 @@ class Plane:
 
 def is_surface(segment: object) -> bool:
     """Whether the segment may meet surfaces of other bodies."""
-    if isinstance(segment, FreeSurface):
-        return True
-    return isinstance(segment, Wall) and not isinstance(segment, Axis)
+    return isinstance(segment, Segment) and segment.meets_bodies
 
 
 def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
@@ -279,7 +279,7 @@ def find_planes(blocks: Sequence[Block], axis: bool) -> list[Plane]:
     planes = [Plane(np.zeros(2), np.array([-1.0, 0.0]), [])] if axis else []
     for block in blocks:
         for segment in block.segments:
-            if not isinstance(segment, Wall) or isinstance(segment, Piston):
+            if not segment.is_rigid or segment.wall == PISTON:
                 continue
             # the wall's line, with the blocks on its right
             line = segment.line(block.nodes)

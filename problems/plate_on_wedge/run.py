@@ -49,7 +49,7 @@ class PlateRun(Simulation):
         self.meetings.find(self.t, self.step)
         nodes = [0]
         points = [self.start]
-        for pair in self.meetings.near:
+        for pair in self.meetings.with_facets:
             parts = [(half.surface, half.pins.positions) for half, _ in pair.halves]
             segments = [getattr(surface, "segment", None) for surface, _ in parts]
             sides = {segment.block: segment.side for segment in segments if segment}

@@ -51,8 +51,8 @@ def make_wedge(angle, speed, *, height=10, length=60, gap=0.5, below=10, stretch
 def find_end(simulation):
     """x of the contact's end that is furthest on; -inf where there is no contact."""
     found = -math.inf
-    for pair in simulation.meetings.near:
-        nodes = pair.follower.line[:, pair.follow.pins.positions >= 0.0]
+    for pair in simulation.meetings.with_facets:
+        nodes = pair.follower.line[:, pair.follower_half.pins.positions >= 0.0]
         if nodes.size:
             found = max(found, float(nodes[0].max()))
     return found

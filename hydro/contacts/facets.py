@@ -509,14 +509,14 @@ def fill_facets(leader, follower, positions, back_positions, straight, pins, cov
 
 @kernel
 def measure_facets(line, follower, rigid, displacement, inverse_dt, facets, count):
-    """Fill the facets' `faces`: rows as of a perimeter's faces, outwards of the leader; normal.
+    """Fill the facets' `geometry`: rows as of a perimeter's faces, outwards of the leader; normal.
 
     line (2, m + 1): the leader at mid-time; follower (2, n + 1); displacement (2, m + 1): the
     displacements of the leader's nodes.  The normal is the mean of those of both curves, or a rigid
     leader's own.
     """
     ends = facets.ends
-    faces = facets.faces
+    geometry = facets.geometry
     for k in range(count):
         a = facets.owners[LEADER, k]
         start = ends[LEADER_START, k]
@@ -526,11 +526,11 @@ def measure_facets(line, follower, rigid, displacement, inverse_dt, facets, coun
         middle = 0.5 * (start + stop)
         speed_x, speed_y = find_point(displacement, a, middle)
         area_x, area_y = y_end - y, x - x_end
-        faces[AREA_X, k] = area_x
-        faces[AREA_Y, k] = area_y
-        faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
-        faces[FACE_X, k] = 0.5 * (x + x_end)
-        faces[FACE_Y, k] = 0.5 * (y + y_end)
+        geometry[AREA_X, k] = area_x
+        geometry[AREA_Y, k] = area_y
+        geometry[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
+        geometry[FACE_X, k] = 0.5 * (x + x_end)
+        geometry[FACE_Y, k] = 0.5 * (y + y_end)
         normal_x, normal_y = find_curve_normal(line, a, middle - a, False, 1.0)
         if not rigid:
             b = facets.owners[FOLLOWER, k]
@@ -538,5 +538,5 @@ def measure_facets(line, follower, rigid, displacement, inverse_dt, facets, coun
             follower_x, follower_y = find_curve_normal(follower, b, fraction, False, 1.0)
             normal_x, normal_y = normal_x - follower_x, normal_y - follower_y
         length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
-        faces[NORMAL_X, k] = normal_x / length
-        faces[NORMAL_Y, k] = normal_y / length
+        geometry[NORMAL_X, k] = normal_x / length
+        geometry[NORMAL_Y, k] = normal_y / length

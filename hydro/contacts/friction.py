@@ -72,11 +72,11 @@ def add_friction(leader, follower, facets, count, friction, dt):
     own_cells, own_line = leader
     cells, line = follower
     for k in range(count):
-        if facets.states[CLOSED, k] == 0.0:
+        if facets.contact_states[CLOSED, k] == 0.0:
             continue
         own = facets.owners[LEADER, k]
         other = facets.owners[FOLLOWER, k]
-        x, y = -facets.faces[NORMAL_Y, k], facets.faces[NORMAL_X, k]
+        x, y = -facets.geometry[NORMAL_Y, k], facets.geometry[NORMAL_X, k]
         # both sides' velocities, inverse masses per area, and the leader's part of the impedances
         z_other = cells[RHO, other] * cells[C, other]
         inverse = 1.0 / (cells[RHO, other] * cells[LENGTH, other])
@@ -93,7 +93,7 @@ def add_friction(leader, follower, facets, count, friction, dt):
         slip = (u_other - u) * x + (v_other - v) * y
         traction = abs(slip) / (dt * (inverse + own_inverse))
         if friction < 1e300:
-            traction = min(traction, max(0.0, friction * facets.states[FACET_P, k]))
+            traction = min(traction, max(0.0, friction * facets.contact_states[FACET_P, k]))
         push = traction if slip > 0.0 else -traction
         area = (facets.areas[AREA_X, k] ** 2 + facets.areas[AREA_Y, k] ** 2) ** 0.5
         # velocities along the facet in the middle of the step
@@ -116,9 +116,9 @@ def measure_closed(facets, count):
     length = 0.0
     before = -1.0
     for k in range(count):
-        if facets.states[CLOSED, k] == 0.0:
+        if facets.contact_states[CLOSED, k] == 0.0:
             continue
-        length += (facets.faces[AREA_X, k] ** 2 + facets.faces[AREA_Y, k] ** 2) ** 0.5
+        length += (facets.geometry[AREA_X, k] ** 2 + facets.geometry[AREA_Y, k] ** 2) ** 0.5
         if facets.ends[LEADER_START, k] != before:
             stretches += 1
         before = facets.ends[LEADER_STOP, k]

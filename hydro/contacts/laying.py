@@ -37,7 +37,7 @@ def find_held(facets, count, leader, follower):
     closed part ends within a face of the follower; inside: the leader's nodes within that part;
     ends_facet: those of the leader at which a closed facet stops.
     """
-    states = facets.states
+    contact_states = facets.contact_states
     ends = facets.ends
     inside = leader.inside
     held = leader.held
@@ -46,7 +46,7 @@ def find_held(facets, count, leader, follower):
     held[:] = False
     inside[:] = False
     for k in range(count):
-        if states[CLOSED, k] == 0.0:
+        if contact_states[CLOSED, k] == 0.0:
             continue
         for row in (FOLLOWER_START, FOLLOWER_STOP):
             node = int(ends[row, k])

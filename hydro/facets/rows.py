@@ -17,15 +17,16 @@ LEADER, FOLLOWER = range(2)
 LEADER_START, LEADER_STOP, FOLLOWER_START, FOLLOWER_STOP = range(4)
 END_ROWS = 4
 
-# faces (7, facets): area outwards of the leader, swept volume per time, middle, unit normal of the
-# curve for which the lines stand
+# geometry (7, facets): area outwards of the leader, swept volume per time, middle, unit normal of
+# the curve for which the lines stand
 AREA_X, AREA_Y, SWEPT_RATE, FACE_X, FACE_Y, NORMAL_X, NORMAL_Y = range(7)
 GEOMETRY_ROWS = 7
 AREAS = slice(AREA_X, SWEPT_RATE + 1)
 AREA_ROWS = 3
 
-# states (7, facets): is it closed (1 or 0), pressure, speed of the facet beyond either side's own
-# outwards of the leader, slip speed, velocity with which the leader's line moves there
+# contact_states (7, facets): whether it is closed (1 or 0), pressure, speed of the facet beyond
+# either side's own outwards of the leader, slip speed, velocity with which the leader's line moves
+# there
 CLOSED, FACET_P, EXCESS_LEADER, EXCESS_FOLLOWER, FACET_SLIP, FACET_U, FACET_V = range(7)
 CONTACT_ROWS = 7
 
@@ -48,25 +49,26 @@ SUM_ROWS = 6
 class Facets(NamedTuple):
     """Arrays over the facets of two lines; the first `count` columns of each are in use.
 
-    areas (3, facets): rows AREAS of `faces`; in axisymmetric flow the same weighted by the radius.
+    areas (3, facets): rows AREAS of `geometry`; in axisymmetric flow the same weighted by the
+    radius.
     """
 
     owners: np.ndarray
     ends: np.ndarray
-    faces: np.ndarray
+    geometry: np.ndarray
     areas: np.ndarray
-    states: np.ndarray
+    contact_states: np.ndarray
 
 
 def make_facets(count: int, curved: bool) -> Facets:
     """Arrays for `count` facets; curved: axisymmetric flow."""
-    faces = np.zeros((GEOMETRY_ROWS, count))
+    geometry = np.zeros((GEOMETRY_ROWS, count))
     return Facets(
         owners=np.zeros((2, count), dtype=np.int64),
         ends=np.zeros((END_ROWS, count)),
-        faces=faces,
-        areas=np.zeros((AREA_ROWS, count)) if curved else faces[AREAS],
-        states=np.zeros((CONTACT_ROWS, count)),
+        geometry=geometry,
+        areas=np.zeros((AREA_ROWS, count)) if curved else geometry[AREAS],
+        contact_states=np.zeros((CONTACT_ROWS, count)),
     )
 
 

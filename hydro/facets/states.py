@@ -102,12 +102,12 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
     """
     closed = 0
     pulled = 0
-    states = facets.states
+    contact_states = facets.contact_states
     for k in range(count):
         a = facets.owners[LEADER, k]
         b = facets.owners[FOLLOWER, k]
-        x, y = facets.faces[FACE_X, k], facets.faces[FACE_Y, k]
-        nx, ny = facets.faces[NORMAL_X, k], facets.faces[NORMAL_Y, k]
+        x, y = facets.geometry[FACE_X, k], facets.geometry[FACE_Y, k]
+        nx, ny = facets.geometry[NORMAL_X, k], facets.geometry[NORMAL_Y, k]
         rho, u, v, p, c, wave_law = compute_state_at(leader, a, x, y)
         w = u * nx + v * ny
         leader_state = (rho, w, p, c, wave_law)
@@ -145,13 +145,13 @@ def solve_facets(leader, follower, facets, count, bond, round_off):
                 rho_other, _, p_other, c_other, wave_law_other = follower_state
                 turned = (rho_other, -w_other, p_other, c_other, wave_law_other)
                 other_speed = -find_free_speed(False, turned, gap_pressure)
-        states[CLOSED, k] = 1.0 if is_closed else 0.0
-        states[FACET_P, k] = pressure
-        states[EXCESS_LEADER, k] = speed - w
-        states[EXCESS_FOLLOWER, k] = other_speed - w_other
-        states[FACET_SLIP, k] = slip
-        states[FACET_U, k] = u + (speed - w) * nx
-        states[FACET_V, k] = v + (speed - w) * ny
+        contact_states[CLOSED, k] = 1.0 if is_closed else 0.0
+        contact_states[FACET_P, k] = pressure
+        contact_states[EXCESS_LEADER, k] = speed - w
+        contact_states[EXCESS_FOLLOWER, k] = other_speed - w_other
+        contact_states[FACET_SLIP, k] = slip
+        contact_states[FACET_U, k] = u + (speed - w) * nx
+        contact_states[FACET_V, k] = v + (speed - w) * ny
     return closed, pulled
 
 
@@ -161,15 +161,15 @@ def add_to_face(facets, k, side, line):
     face = facets.owners[side, k]
     sign = 1.0 if side == LEADER else -1.0
     row = EXCESS_LEADER if side == LEADER else EXCESS_FOLLOWER
-    square = facets.faces[AREA_X, k] ** 2 + facets.faces[AREA_Y, k] ** 2
+    square = facets.geometry[AREA_X, k] ** 2 + facets.geometry[AREA_Y, k] ** 2
     weight = (square / line.squares[face]) ** 0.5
     sums = line.sums
     sums[WEIGHT, face] += weight
-    sums[SUM_P, face] += weight * facets.states[FACET_P, k]
-    sums[SUM_EXCESS, face] += weight * sign * facets.states[row, k]
-    sums[SUM_SLIP, face] += weight * facets.states[FACET_SLIP, k]
-    sums[SUM_U, face] += weight * facets.states[FACET_U, k]
-    sums[SUM_V, face] += weight * facets.states[FACET_V, k]
+    sums[SUM_P, face] += weight * facets.contact_states[FACET_P, k]
+    sums[SUM_EXCESS, face] += weight * sign * facets.contact_states[row, k]
+    sums[SUM_SLIP, face] += weight * facets.contact_states[FACET_SLIP, k]
+    sums[SUM_U, face] += weight * facets.contact_states[FACET_U, k]
+    sums[SUM_V, face] += weight * facets.contact_states[FACET_V, k]
 
 
 @kernel
@@ -179,7 +179,7 @@ def sum_over_faces(leader, follower, facets, count, with_open):
     with_open: those of open facets too.
     """
     for k in range(count):
-        if facets.states[CLOSED, k] == 0.0 and not with_open:
+        if facets.contact_states[CLOSED, k] == 0.0 and not with_open:
             continue
         if facets.owners[FOLLOWER, k] >= 0:
             add_to_face(facets, k, FOLLOWER, follower)
@@ -204,11 +204,11 @@ def make_add_facet_flux(geometry: Geometry = PLANE):
         flux = line.flux
         for k in range(count):
             face = facets.owners[side, k]
-            if face < 0 or facets.states[CLOSED, k] == 0.0:
+            if face < 0 or facets.contact_states[CLOSED, k] == 0.0:
                 continue
-            p = sign * (facets.states[FACET_P, k] - line.gap_p[face])
+            p = sign * (facets.contact_states[FACET_P, k] - line.gap_p[face])
             momentum_y, push, hoop = split(
-                p * areas[AREA_Y, k], p, areas[AREA_Y, k], facets.faces[AREA_Y, k]
+                p * areas[AREA_Y, k], p, areas[AREA_Y, k], facets.geometry[AREA_Y, k]
             )
             flux[MOMENTUM_X, face] += p * areas[AREA_X, k]
             flux[MOMENTUM_Y, face] += momentum_y

@@ -116,7 +116,7 @@ def find_last_crossing(line, other):
 
 
 @compiled_once
-def fill_piece_face(line, displacement, a, piece, inverse_dt, faces):
+def fill_piece_face(line, displacement, a, piece, inverse_dt, geometry):
     """Area, swept volume per time, middle and normal of one piece of face `a`.
 
     piece: where on the face it begins and ends, 0 to 1, its number, and the orientation; and
@@ -130,15 +130,15 @@ def fill_piece_face(line, displacement, a, piece, inverse_dt, faces):
     middle = 0.5 * (start + stop)
     speed_x = displacement[0, a] + middle * (displacement[0, a + 1] - displacement[0, a])
     speed_y = displacement[1, a] + middle * (displacement[1, a + 1] - displacement[1, a])
-    faces[AREA_X, k] = area_x
-    faces[AREA_Y, k] = area_y
-    faces[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
-    faces[FACE_X, k] = line[0, a] + middle * dx
-    faces[FACE_Y, k] = line[1, a] + middle * dy
+    geometry[AREA_X, k] = area_x
+    geometry[AREA_Y, k] = area_y
+    geometry[SWEPT_RATE, k] = inverse_dt * (speed_x * area_x + speed_y * area_y)
+    geometry[FACE_X, k] = line[0, a] + middle * dx
+    geometry[FACE_Y, k] = line[1, a] + middle * dy
     normal_x, normal_y = find_curve_normal(line, a, middle, ring, orientation)
     length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
-    faces[NORMAL_X, k] = normal_x / length
-    faces[NORMAL_Y, k] = normal_y / length
+    geometry[NORMAL_X, k] = normal_x / length
+    geometry[NORMAL_Y, k] = normal_y / length
 
 
 @kernel
@@ -170,7 +170,7 @@ def fill_pieces(line, displacement, positions, orientation, inverse_dt, facets):
             facets.ends[LEADER_START, count] = start
             facets.ends[LEADER_STOP, count] = stop
             piece = (start - a, stop - a, count, orientation, ring)
-            fill_piece_face(line, displacement, a, piece, inverse_dt, facets.faces)
+            fill_piece_face(line, displacement, a, piece, inverse_dt, facets.geometry)
             count += 1
         while k < followers and positions[k] <= stop:
             k += 1

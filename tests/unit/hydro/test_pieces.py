@@ -64,7 +64,7 @@ def test_pieces_are_the_common_refinement(seed, whole):
     places = make_places(random, 13, 29, whole)
     pieces, count = cut(line, places)
     owners = pieces.owners[:, :count]
-    faces = pieces.faces[:, :count]
+    faces = pieces.geometry[:, :count]
     bounds = np.unique(np.concatenate((np.arange(14.0), places)))
     assert owners.shape[1] == bounds.size - 1
     middles = 0.5 * (bounds[1:] + bounds[:-1])
@@ -94,9 +94,9 @@ def test_what_one_side_gives_the_other_takes(seed, geometry):
     places = make_places(random, 13, 29, True)
     curved = geometry == "axisymmetric"
     pieces, count = cut(line, places, 1.0, 0.1 * random.random((2, 14)), 1.0, curved)
-    pieces.states[FACET_P] = random.random(pieces.states.shape[1])
-    pieces.states[CLOSED] = 1.0
-    pieces.areas[...] = pieces.faces[AREAS] * (2.0 if curved else 1.0)
+    pieces.contact_states[FACET_P] = random.random(pieces.contact_states.shape[1])
+    pieces.contact_states[CLOSED] = 1.0
+    pieces.areas[...] = pieces.geometry[AREAS] * (2.0 if curved else 1.0)
     add_facet_flux = make_add_facet_flux(find_geometry(geometry))
     lines = [make_line_arrays(np.ones((3, n))) for n in (13, places.size - 1)]
     for side, half in zip((LEADER, FOLLOWER), lines, strict=True):
@@ -124,7 +124,7 @@ def test_contact_does_not_pull():
     other.states[V] = 0.1, -0.1  # the first flies off, the second comes
     closed, pulled = solve_facets(mine, other, pieces, count, 0.0, 0.0)
     assert (count, closed, pulled) == (3, 1, 1)
-    found = pieces.states[:, :count]
+    found = pieces.contact_states[:, :count]
     assert found[CLOSED].tolist() == [0.0, 1.0, 0.0]
     assert found[FACET_P, 0] == 0.0 and found[FACET_P, 2] == 0.0
     excess = found[[EXCESS_LEADER, EXCESS_FOLLOWER]]

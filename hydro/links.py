@@ -33,6 +33,7 @@ from shockgrid.regrid.errors import BadInput
 LARGEST_CLOSED_GAP = 1e-4
 # of the link's extent
 ROUND_OFF_GAP = 1e-9
+MOST_JOINED_NAMES = 3  # of materials in one label
 
 
 class Link:
@@ -196,9 +197,6 @@ class Exchange:
         """Accept the step."""
         for contact in self.contacts:
             contact.accept()
-
-
-MOST_JOINED_NAMES = 3  # of materials in one label
 
 
 def name_materials(blocks: Sequence[Block], links: Sequence[Link | SlidingContact]) -> None:

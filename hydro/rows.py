@@ -19,12 +19,6 @@ HELD_ARRAYS = ("state", "void_energy")
 RHO, U, V, P = range(4)
 STATE_ROWS = 4
 
-
-def make_held(ni: int, nj: int) -> dict[str, np.ndarray]:
-    """Arrays of HELD_ARRAYS for ni × nj cells, zero: the state has a layer of ghosts around."""
-    return {"state": np.zeros((STATE_ROWS, ni + 2, nj + 2)), "void_energy": np.zeros((ni, nj))}
-
-
 # index of the node at an end of a line: 0 is its first end, 1 its last
 END_INDEX = (0, -1)
 
@@ -47,3 +41,8 @@ TOTAL_ROWS = 8
 CONSERVED = slice(TOTAL_MASS, VOIDED)
 MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
 NO_C2 = 1e300  # least c² of no cell at all
+
+
+def make_held(ni: int, nj: int) -> dict[str, np.ndarray]:
+    """Arrays of HELD_ARRAYS for ni × nj cells, zero: the state has a layer of ghosts around."""
+    return {"state": np.zeros((STATE_ROWS, ni + 2, nj + 2)), "void_energy": np.zeros((ni, nj))}

@@ -61,6 +61,8 @@ FLOW_QUANTITIES = 4
 # is
 MEAN_POSITION, VOLUME, MEMBERSHIPS = range(3)
 SIZE_ROWS = 3
+RATE_MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
+TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
 
 
 @compiled_once(allocates=False)
@@ -445,10 +447,6 @@ def make_redistribution(eos_class, geometry: Geometry):
         return changed, least_c2, voided
 
     return redistribute
-
-
-RATE_MARGIN = 1.0 + 1e-9  # a rate must exceed a limit by more than round-off
-TOUCHED_REACH = MOST_REACH + 1  # rows beyond a squeezed cell that its redistribution reads
 
 
 class Fastest(NamedTuple):

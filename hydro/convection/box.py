@@ -29,6 +29,9 @@ from scipy import sparse
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import SIDE_NAMES
 
+PAIRS = (("i_min", "i_max"), ("j_min", "j_max"))
+FEWEST_CELLS = 3
+
 
 @dataclass(frozen=True)
 class Fluid:
@@ -105,7 +108,6 @@ def make_fluid(rayleigh: float, prandtl: float, tilt: float = 0.0) -> Fluid:
     return Fluid(prandtl, 1.0, (-strength * x, -strength * y))
 
 
-PAIRS = (("i_min", "i_max"), ("j_min", "j_max"))
 Along = float | Callable[[np.ndarray], np.ndarray]
 
 
@@ -187,9 +189,6 @@ def check_walls(walls: Mapping[str, Wall]) -> None:
 def fixes_temperature(walls: Mapping[str, Wall]) -> bool:
     """Whether any side is isothermal."""
     return any(wall.temperature is not None for wall in walls.values())
-
-
-FEWEST_CELLS = 3
 
 
 class Axis:

@@ -68,6 +68,20 @@ from shockgrid.hydro.convection.tensor_grids import (
 from shockgrid.regrid.errors import BadInput, Place, RunFailure
 
 SCHEMES = ("exponential", "samarskii", "upwind", "central")
+STEADY_CHANGE = 1e-12  # relative change in a time L^2/kappa below which the state is steady
+RESTING_NODE_MOVE = 2e-14  # of the axis: nodes that move by less between steady solves have settled
+COLUMN_STEP_GROWTH = 1.25  # of dt from step to step
+FIRST_STEP_PART = 1e-4  # first dt over L^2/kappa
+LONGEST_STEP_PART = 0.01  # of the whole time: the grid needs a number of steps to settle
+FAMILIES = ("fixed", "after", "law", "first")
+SDIRK_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+MOST_NEWTON_ITERATIONS = 30  # iterations at most; four are typical
+LEAST_CELL_SHRINKAGE = 0.2  # of a cell's length: the lagging speed may shrink it to that
+FIRST_CORRECTIONS = 60  # at most, of the moving grids for the solution at t = 0
+PLACED_NODE_MOVE = 1e-10  # of the column: nodes that move by less have settled
+# of the blocks in pictures, one above the other
+DRAWN_BLOCK_HEIGHT = 0.08
+DRAWN_BLOCK_GAP = 0.1
 
 
 @dataclass(frozen=True)
@@ -217,13 +231,6 @@ def solve_column(column: Column, x: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 def to_nodes(x: np.ndarray, values: np.ndarray, walls: tuple[float, float]) -> np.ndarray:
     """Values (n + 1,) at the nodes: linear between centres, `walls` at the ends."""
     return np.interp(x, get_places(x), enclose(values, walls))
-
-
-STEADY_CHANGE = 1e-12  # relative change in a time L^2/kappa below which the state is steady
-RESTING_NODE_MOVE = 2e-14  # of the axis: nodes that move by less between steady solves have settled
-COLUMN_STEP_GROWTH = 1.25  # of dt from step to step
-FIRST_STEP_PART = 1e-4  # first dt over L^2/kappa
-LONGEST_STEP_PART = 0.01  # of the whole time: the grid needs a number of steps to settle
 
 
 def make_profile(column: Column, kind: str, x: np.ndarray, temperature, velocity):
@@ -399,11 +406,6 @@ class ColumnMarch:
         self.heat_in = float(state["heat_in"])
         self.still = bool(state["still"])
 
-
-FAMILIES = ("fixed", "after", "law", "first")
-SDIRK_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-MOST_NEWTON_ITERATIONS = 30  # iterations at most; four are typical
-LEAST_CELL_SHRINKAGE = 0.2  # of a cell's length: the lagging speed may shrink it to that
 
 Ends = Callable[[float], np.ndarray]
 
@@ -582,13 +584,6 @@ class FrontColumn:
         self.x = target
         if self.family == "after":
             self.x = placing.correct(target, measure_gradient(target, self.u, ends(t + dt)))
-
-
-FIRST_CORRECTIONS = 60  # at most, of the moving grids for the solution at t = 0
-PLACED_NODE_MOVE = 1e-10  # of the column: nodes that move by less have settled
-# of the blocks in pictures, one above the other
-DRAWN_BLOCK_HEIGHT = 0.08
-DRAWN_BLOCK_GAP = 0.1
 
 
 class Exact(Protocol):

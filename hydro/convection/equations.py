@@ -45,6 +45,7 @@ from shockgrid.regrid.sides import SIDE_NAMES
 
 Matrix = sparse.csr_matrix
 Ends = tuple[float, float]  # of an axis: 1 if the wall's value is given, 0 if the slope vanishes
+SOLUTION_TOLERANCE = 1e-6  # of the residual of a solution, relative to the right-hand side
 
 
 def kron(component: int, along: Matrix | np.ndarray, cross: Matrix | np.ndarray) -> Matrix:
@@ -374,9 +375,6 @@ class Equations:
         heat = self.heat.balance @ (scale_rows(curl @ psi, values))
         heat -= fluid.diffusivity * self.heat.conduction
         return sparse.bmat([[momentum, -self.buoyancy(fluid)], [heat_by_psi, heat]], "csc")
-
-
-SOLUTION_TOLERANCE = 1e-6  # of the residual of a solution, relative to the right-hand side
 
 
 class Factors:

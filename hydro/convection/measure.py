@@ -29,6 +29,11 @@ from shockgrid.hydro.convection.steady import slip
 from shockgrid.regrid.errors import BadInput, RunFailure
 from shockgrid.regrid.sides import SIDE_NAMES
 
+WANTED_EIGENVALUES = 4  # eigenvalues, of which the fastest is taken
+# distance of the filter's shift from the growth rate, over the free-fall rate
+FILTER_DETUNING = 1e-3
+FILTER_REPEATS = 20  # of the filter
+
 
 def compute_local_nusselt(
     equations: Equations,
@@ -135,12 +140,6 @@ def measure_energy(equations: Equations, psi: np.ndarray) -> float:
     momentum = equations.momentum
     velocity = (momentum.curl @ psi) / momentum.lengths
     return float(0.5 * (velocity**2 * momentum.lengths * momentum.reaches).sum())
-
-
-WANTED_EIGENVALUES = 4  # eigenvalues, of which the fastest is taken
-# distance of the filter's shift from the growth rate, over the free-fall rate
-FILTER_DETUNING = 1e-3
-FILTER_REPEATS = 20  # of the filter
 
 
 def solve_rest(equations: Equations, fluid: Fluid) -> tuple[np.ndarray, np.ndarray]:

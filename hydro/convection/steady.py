@@ -26,6 +26,16 @@ from shockgrid.hydro.convection.tensor_grids import check_kind, correct_tensor_g
 from shockgrid.regrid.errors import BadInput, RunFailure
 from shockgrid.regrid.sides import SIDE_NAMES
 
+FIRST_RAYLEIGH = 1e4  # Newton's iteration converges from rest up to here
+ROUGH_STAGE_CHANGE = 1e-3  # change at which a stage before the last counts as converged
+LONGEST_STAGE = 15  # iterations
+LEAST_FACTOR = 1e-3  # of a stage, in the decimal logarithm
+LEAST_CAUTION = 1e-3  # least fraction of a grid correction
+GRID_CORRECTION_CHANGE = 1e-2  # change at which the grid is corrected
+# of the solver's state
+COUNTERS = ("iterations", "stage_iterations", "corrections")
+NUMBERS = ("change", "stage_best", "grid_shift", "residual", "exponent", "factor", "caution")
+
 
 def transfer(
     old: Equations, new: Equations, psi: np.ndarray, temperature: np.ndarray
@@ -116,18 +126,6 @@ def to_nodes(axis: Axis, values: np.ndarray, k: int, low, high) -> np.ndarray:
         nodal[0] = cells[0] if low is None else low
         nodal[-1] = cells[-1] if high is None else high
     return np.moveaxis(nodal, 0, k)
-
-
-FIRST_RAYLEIGH = 1e4  # Newton's iteration converges from rest up to here
-ROUGH_STAGE_CHANGE = 1e-3  # change at which a stage before the last counts as converged
-LONGEST_STAGE = 15  # iterations
-LEAST_FACTOR = 1e-3  # of a stage, in the decimal logarithm
-LEAST_CAUTION = 1e-3  # least fraction of a grid correction
-GRID_CORRECTION_CHANGE = 1e-2  # change at which the grid is corrected
-
-# of the solver's state
-COUNTERS = ("iterations", "stage_iterations", "corrections")
-NUMBERS = ("change", "stage_best", "grid_shift", "residual", "exponent", "factor", "caution")
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,22 @@ from shockgrid.hydro.eos.temperature import compute_solid_temperature
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.jit import choose, inlined
 
+FORMULA_PARTS = (
+    "pressure_part",
+    "energy_part",
+    "sound_speed_squared_part",
+    "least_pressure_part",
+)
+# of the full density: what is left of a cell of fragments that has emptied
+REMAINING_DENSITY_PART = 1e-9
+SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes
+ISENTROPE_DENSITY_STEP = 1e-5  # of the density, along the isentrope
+MOST_MISS = 1e-9  # of rho c²: from p to e and back
+MOST_SLOPE = 0.01  # of c²
+PROBED_PRESSURE_STEP = 0.01  # of rho c²: a pressure beside that of a state
+# of the strength left, under tension: from half of it on c² is that of separate pieces
+TORN_STRENGTH_PART = 0.4
+
 
 @dataclass(frozen=True)
 class EquationOfState:
@@ -164,14 +180,6 @@ class EquationOfState:
             return np.sqrt(self.sound_speed_squared_part(rho, p, self.parameters))
 
 
-SLOPE_FRACTIONS = (
-    "pressure_part",
-    "energy_part",
-    "sound_speed_squared_part",
-    "least_pressure_part",
-)
-
-
 def check_eos(block: str, eos: object) -> None:
     """Raise BadInput where `eos` cannot be that of the block: a class, a number, a part missing."""
     where = f"block {block!r}: eos"
@@ -179,7 +187,7 @@ def check_eos(block: str, eos: object) -> None:
         name = eos.__name__
         raise BadInput(f"{where} is the class {name}; one made of it is wanted, {name}(...)")
     kind = type(eos)
-    wanted = (*SLOPE_FRACTIONS, "opens_voids", "has_kinks", "parameters")
+    wanted = (*FORMULA_PARTS, "opens_voids", "has_kinks", "parameters")
     missing = [name for name in wanted if not hasattr(kind, name)]
     if len(missing) == len(wanted):
         raise BadInput(
@@ -187,7 +195,7 @@ def check_eos(block: str, eos: object) -> None:
         )
     if missing:
         raise BadInput(f"{where} is of the class {kind.__name__}, which lacks {', '.join(missing)}")
-    for name in SLOPE_FRACTIONS:
+    for name in FORMULA_PARTS:
         if not isinstance(inspect.getattr_static(kind, name), staticmethod):
             raise BadInput(f"{where}: {kind.__name__}.{name} is not a staticmethod({name})")
         if not hasattr(getattr(kind, name), "compiled_as"):
@@ -253,10 +261,6 @@ def make_least_pressure(eos_class):
     return keep if strength_left_part is None else weaken
 
 
-# of the full density: what is left of a cell of fragments that has emptied
-REMAINING_DENSITY_PART = 1e-9
-
-
 def make_leaving_part(eos_class):
     """`part(rho, parameters)` of a class: the fraction of its flux with which material of a density
     leaves a cell, or None without `least_density_part`.
@@ -277,15 +281,6 @@ def make_leaving_part(eos_class):
         return choose(leaving_part > 0.0, leaving_part, 0.0 * rho)
 
     return find_leaving_part
-
-
-SAMPLED_CELLS = 64  # cells of a block that are looked at, besides its extremes
-ISENTROPE_DENSITY_STEP = 1e-5  # of the density, along the isentrope
-MOST_MISS = 1e-9  # of rho c²: from p to e and back
-MOST_SLOPE = 0.01  # of c²
-PROBED_PRESSURE_STEP = 0.01  # of rho c²: a pressure beside that of a state
-# of the strength left, under tension: from half of it on c² is that of separate pieces
-TORN_STRENGTH_PART = 0.4
 
 
 def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:

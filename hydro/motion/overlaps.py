@@ -36,6 +36,10 @@ from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
 CHECKED_TIMES = 101  # at which pistons are checked beforehand
 OVERLAP_DEPTH_PART = 0.25  # fraction of the cells along a side: further in, blocks overlap
 MOST_GROUPS = 64  # boxes of a line
+ADVICE = (
+    "blocks may touch, not overlap; link sides that stay together, and cut curves that touch the "
+    "same way, or finer"
+)
 
 
 @kernel
@@ -265,12 +269,6 @@ class Overlaps:
             f"block {a.block.name!r}, side {a.side}, and block {b.block.name!r}, side {b.side}, "
             f"lie on each other at x = {x:.6g} m, y = {y:.6g} m"
         )
-
-
-ADVICE = (
-    "blocks may touch, not overlap; link sides that stay together, and cut curves that touch the "
-    "same way, or finer"
-)
 
 
 def _leaves(segment: Segment) -> bool:

@@ -39,6 +39,13 @@ from shockgrid.regrid.measure.quality import find_bad_cells, say_not_convex
 from shockgrid.regrid.sides import J_MIN, SIDE_NAMES, get_sides
 
 LEAST_SLIVER = 1e-13  # part of a cell from which on a gap is no round-off
+FLOW_QUANTITIES = 4  # mass, momentum x, y and energy, before what is carried
+LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
+FILTERS = (minimum_filter, maximum_filter)
+BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
+LOCATED_CELLS_CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
+SLOPE_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
+MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
 @dataclass(frozen=True)
@@ -129,15 +136,6 @@ def balance_slivers(
         mass = content[..., 0] / content[..., 0].sum(axis=axis, keepdims=True)
         content = content + mass[..., None] * np.expand_dims(balance[owners == side], axis)
     return content, slivers
-
-
-FLOW_QUANTITIES = 4  # mass, momentum x, y and energy, before what is carried
-LEAST_LEFT = 0.05  # of a cell's density and c² that its linear fields must leave at its corners
-FILTERS = (minimum_filter, maximum_filter)
-BEYOND_SIDES = 0.05  # of density and rho c²: how far beyond those around corners at a side may be
-LOCATED_CELLS_CHUNK = 2048  # cells whose corners are looked at together, as they fit into the cache
-SLOPE_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the slopes, tried in this order
-MOST_SLIVERS = 0.05  # part of a block's volume by which outlines may differ
 
 
 def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:

@@ -42,6 +42,19 @@ from shockgrid.regrid.measure.quality import measure_turns
 from shockgrid.regrid.protocol import call_regridder
 from shockgrid.regrid.sides import SIDE_NAMES
 
+NEW_GRID_PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
+SAME_GRID_DISTANCE = 1e-9  # of a grid's size: nodes that depend on time alone
+STEPS_PER_LINE_CHECK = 50  # steps from one look at the lines to the next
+LONGEST_COLUMN_EDGE = 3.0  # edges of the first ones' mean from which on a column is split
+SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
+LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
+CALM_LIMIT_PART = 0.5  # part of both limits below which all edges and turns are before a line goes
+LONGEST_MERGED = 1.0  # edge of two merged columns, of the first mean
+MOST_CHANGED_COLUMNS = 0.125  # part of all columns that are split or merged at once
+MOST_COLUMN_GROWTH = 8  # times the first count of columns
+SETTLING_PASSES = 10  # of the regridders, so that grids settle before they move again
+MIRROR_TIE = 1e-6  # mirror images are chosen together
+
 
 def respace_line(line: np.ndarray, spacing: np.ndarray, new_spacing: np.ndarray) -> np.ndarray:
     """Nodes (2, m) on the polyline `line` (2, n) [m], the ends the same.
@@ -80,10 +93,6 @@ def sample_grid(old: np.ndarray, sides: dict[str, np.ndarray]) -> np.ndarray:
     along_i_mixed = along_i[0][:, None] * (1.0 - part_j) + along_i[1][:, None] * part_j
     along_j_mixed = along_j[0][None, :] * (1.0 - part_i) + along_j[1][None, :] * part_i
     return np.array([along_i_mixed, along_j_mixed])
-
-
-NEW_GRID_PASSES = 3  # of the regridder over a new grid, as each brings it a step nearer to its own
-SAME_GRID_DISTANCE = 1e-9  # of a grid's size: nodes that depend on time alone
 
 
 @dataclass(frozen=True)
@@ -276,17 +285,6 @@ def _follow_mesh(
         places = sample_grid(old_block.nodes, sides)
         new_block.nodes[...] = [map_coordinates(row, places, order=1) for row in old_block.nodes]
 
-
-STEPS_PER_LINE_CHECK = 50  # steps from one look at the lines to the next
-LONGEST_COLUMN_EDGE = 3.0  # edges of the first ones' mean from which on a column is split
-SHARPEST = np.radians(15.0)  # turn at a node from which on the columns beside it are split
-LEAST_SPLIT = 0.3  # of the first edges' mean: shorter ones are not split for a turn's sake
-CALM_LIMIT_PART = 0.5  # part of both limits below which all edges and turns are before a line goes
-LONGEST_MERGED = 1.0  # edge of two merged columns, of the first mean
-MOST_CHANGED_COLUMNS = 0.125  # part of all columns that are split or merged at once
-MOST_COLUMN_GROWTH = 8  # times the first count of columns
-SETTLING_PASSES = 10  # of the regridders, so that grids settle before they move again
-MIRROR_TIE = 1e-6  # mirror images are chosen together
 
 Nodes = list[np.ndarray]
 # nodes and states (4, ni, nj) of all blocks -> blocks, links, what makes their regridders

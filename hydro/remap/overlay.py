@@ -26,6 +26,9 @@ import numpy as np
 from shockgrid.regrid.jit import compiled_once, kernel
 
 MOST_CORNERS = 16  # of a quadrilateral cut by four lines, with room for corners that coincide
+STEEPEST_CONTINUATION = 3.0  # times the difference before it: how far means go on beyond a side
+MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quantities, 3)
+LEAST_GAP = 1e-9  # part of a cell that may stay uncovered before the old grid is searched for it
 
 
 @compiled_once
@@ -125,10 +128,6 @@ def compute_cell_moments(nodes: np.ndarray, curved: bool) -> tuple[np.ndarray, n
     return volumes, centres
 
 
-STEEPEST_CONTINUATION = 3.0  # times the difference before it: how far means go on beyond a side
-MEAN, SLOPE_X, SLOPE_Y = range(3)  # last index of linear fields (ni, nj, quantities, 3)
-
-
 def continue_beyond_sides(means: np.ndarray) -> np.ndarray:
     """Means (n, ni + 2, nj + 2) with a layer of cells around, theory F12.3.
 
@@ -225,9 +224,6 @@ def make_linear_fields(means: np.ndarray, nodes: np.ndarray, centres: np.ndarray
     fields = np.empty((ni, nj, count, 3))
     fill_linear_fields(means, np.ascontiguousarray(nodes), centres, least, greatest, fields)
     return fields
-
-
-LEAST_GAP = 1e-9  # part of a cell that may stay uncovered before the old grid is searched for it
 
 
 @compiled_once

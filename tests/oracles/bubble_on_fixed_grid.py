@@ -179,7 +179,7 @@ class TwoGasFlow:
 # ends of the channel over the radius
 LEFT = -4.0
 RIGHT = 6.4
-SLOPE_FRACTIONS = 8  # a cell that the circle cuts is counted out by so many points each way
+PARTS = 8  # a cell that the circle cuts is counted out by so many points each way
 COLUMNS = ("t", "upwind", "downwind", "rear", "axis_front", "wall_front")
 
 
@@ -217,12 +217,12 @@ def make_flow(problem: ShockBubble, cells: int) -> tuple[TwoGasFlow, np.ndarray]
         np.arange(round(LEFT * BUBBLE_RADIUS / size), round(RIGHT * BUBBLE_RADIUS / size)) + 0.5
     ) * size
     y = (np.arange(round(HALF_HEIGHT / size)) + 0.5) * size
-    points = size * ((np.arange(SLOPE_FRACTIONS) + 0.5) / SLOPE_FRACTIONS - 0.5)
+    points = size * ((np.arange(PARTS) + 0.5) / PARTS - 0.5)
     share = np.zeros((y.size, x.size))
     for along in points:
         for up in points:
             share += np.hypot(x + along, y[:, None] + up) < BUBBLE_RADIUS
-    share /= SLOPE_FRACTIONS**2
+    share /= PARTS**2
     behind = np.clip((-(1.0 + FIRST_GAP_RADII) * BUBBLE_RADIUS - x) / size + 0.5, 0.0, 1.0)
     shock = problem.shock
     air = 1.0 / (AIR.gamma - 1.0)

@@ -9,7 +9,7 @@ import pytest
 
 from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
 from shockgrid.runs.early_end.causes import name_failure
-from shockgrid.runs.forecast import SLOPE_FRACTIONS, ShortSteps, TimeLeft
+from shockgrid.runs.forecast import PARTS, ShortSteps, TimeLeft
 from shockgrid.runs.inspection.account import RULES, describe_verdict, judge
 
 
@@ -79,7 +79,7 @@ def test_a_falling_dt_is_followed(fall):
 def test_a_run_that_ends_before_its_end_time_is_expected_to_do_so_again():
     rows = march(lambda t: 1e-3, t_end=0.6)
     _, times, walls = np.array([(0, 0.0, 0.0), *rows]).T
-    course = tuple(np.interp(SLOPE_FRACTIONS, times, walls / walls[-1]))
+    course = tuple(np.interp(PARTS, times, walls / walls[-1]))
     assert course[12:] == (1.0,) * 9
     (_, likely, _), real = foretell(rows, 0.25, course)
     assert likely == pytest.approx(real, rel=0.02)

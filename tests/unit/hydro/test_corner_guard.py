@@ -7,8 +7,8 @@ import pytest
 
 from shockgrid.hydro.motion.constraints import (
     NARROW_CORNER_ANGLE,
-    compute_way,
-    compute_way_in,
+    compute_straightening,
+    compute_widening,
     find_corner,
 )
 from shockgrid.problems.deck import Regrid
@@ -32,12 +32,12 @@ def test_a_corner_too_wide_is_taken_to_a_straight_angle(turn, part, height):
     after = rotation @ [0.1, 0.0]
     place = rotation @ [0.1 - height, 2.0 - 2.0 * part]
     assert measure_angle(place, before, after) > math.pi + 1e-3
-    moved = place + compute_way(place, before, after)
+    moved = place + compute_straightening(place, before, after)
     angle = measure_angle(moved, before, after)
     assert angle == pytest.approx(math.pi, abs=1e-14)
     along = (moved - place) @ (after - before)
     assert abs(along) < 1e-12, "the node moves across the line between its neighbours only"
-    assert np.abs(compute_way(moved, before, after)).max() < 1e-15
+    assert np.abs(compute_straightening(moved, before, after)).max() < 1e-15
 
 
 @pytest.mark.parametrize("angle", [0.05, 0.01, 0.0, -0.01])
@@ -48,12 +48,12 @@ def test_a_corner_that_closes_keeps_an_angle(angle):
     before = place + 0.2 * np.array([math.cos(angle), math.sin(angle)])
     moved = place.copy()
     for _ in range(40):
-        way = compute_way_in(moved, before, after, NARROW_CORNER_ANGLE)
+        way = compute_widening(moved, before, after, NARROW_CORNER_ANGLE)
         assert np.hypot(*way) <= 0.5 * np.hypot(*(after - moved)) + 1e-15
         moved += way
     if angle > 0.0:
         assert measure_angle(moved, before, after) == pytest.approx(NARROW_CORNER_ANGLE, rel=1e-3)
-    wide = compute_way_in(place, place + np.array([0.0, 0.1]), after, NARROW_CORNER_ANGLE)
+    wide = compute_widening(place, place + np.array([0.0, 0.1]), after, NARROW_CORNER_ANGLE)
     assert not wide.any()
 
 

@@ -220,7 +220,7 @@ class Plane:
     rigid = True
     back = False
     count = 1
-    way = 0.0
+    largest_displacement = 0.0
     bond = friction = length = np.inf
     block = None
     ends = (None, None)

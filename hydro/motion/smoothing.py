@@ -319,7 +319,7 @@ def measure_line_speed(nodes, faces, walls):
 def gather_line(nodes, location, rim, start, backwards, line, faces):
     """Nodes and faces (contact velocity and slip) of a block's line, from `start` on.
 
-    span: of `hydro.motion.line.Line`; `backwards`: from its last node to its first.
+    location: of `hydro.motion.line.Line`; `backwards`: from its last node to its first.
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     side, first_node, count, first, _ = location

@@ -22,6 +22,9 @@ from shockgrid.hydro.rim import LENGTH, NX, NY, P_STAR, RHO, SLIP, U_STAR, V_STA
 from shockgrid.hydro.rows import ENERGY, MOMENTUM_X, MOMENTUM_Y
 from shockgrid.regrid.jit import compiled_once, kernel
 
+# coefficient of friction from which on surfaces that slide are welded
+WELDED_FRICTION = 1e300
+
 
 @kernel
 def cover_surface(sums, start, step, state, rim):
@@ -41,10 +44,10 @@ def cover_surface(sums, start, step, state, rim):
         length = (area_x * area_x + area_y * area_y) ** 0.5
         nx, ny = area_x / length, area_y / length
         u, v = rim[state + U, face], rim[state + V, face]
-        own = u * nx + v * ny
-        excess = bare * (rim[W_STAR, face] - own) + scale * sums[SUM_EXCESS, k]
+        normal_speed = u * nx + v * ny
+        excess = bare * (rim[W_STAR, face] - normal_speed) + scale * sums[SUM_EXCESS, k]
         rim[P_STAR, face] = bare * rim[P_STAR, face] + scale * sums[SUM_P, k]
-        rim[W_STAR, face] = own + excess
+        rim[W_STAR, face] = normal_speed + excess
         rim[U_STAR, face] = u + excess * nx
         rim[V_STAR, face] = v + excess * ny
         rim[SLIP, face] = scale * sums[SUM_SLIP, k]
@@ -63,47 +66,52 @@ def add_force(flux, face, force, direction, speed):
 def add_friction(leader, follower, facets, count, friction, dt):
     """Add Coulomb friction to the outward fluxes of both sides of closed facets.
 
-    leader, follower: (cells, line), the rows RHO to LENGTH of the rim (6, faces) and `LineArrays`.
+    leader, follower: cells and line of each, the rows RHO to LENGTH of the rim (6, faces) and
+    `LineArrays`.
     The traction is `friction` times the contact pressure against the slip of the cells beside the
     facet, but no more than stops it within the step; without end it welds.  It works at the mean
     of both velocities by the other's impedance, so that its heat goes into the cells as their
     impedances.  Theory F16.5.
     """
-    own_cells, own_line = leader
-    cells, line = follower
+    leader_cells, leader_line = leader
+    follower_cells, follower_line = follower
     for k in range(count):
         if facets.contact_states[CLOSED, k] == 0.0:
             continue
-        own = facets.owners[LEADER, k]
-        other = facets.owners[FOLLOWER, k]
+        leader_face = facets.owners[LEADER, k]
+        follower_face = facets.owners[FOLLOWER, k]
         x, y = -facets.geometry[NORMAL_Y, k], facets.geometry[NORMAL_X, k]
         # both sides' velocities, inverse masses per area, and the leader's part of the impedances
-        z_other = cells[RHO, other] * cells[C, other]
-        inverse = 1.0 / (cells[RHO, other] * cells[LENGTH, other])
-        u_other, v_other = cells[U, other], cells[V, other]
-        u, v = own_line.velocity[0], own_line.velocity[1]
-        part = 0.0
-        own_inverse = 0.0
-        if not own_line.rigid:
-            u, v = own_cells[U, own], own_cells[V, own]
-            z = own_cells[RHO, own] * own_cells[C, own]
-            part = z / (z + z_other)
-            own_inverse = 1.0 / (own_cells[RHO, own] * own_cells[LENGTH, own])
+        z_other = follower_cells[RHO, follower_face] * follower_cells[C, follower_face]
+        follower_inverse = 1.0 / (
+            follower_cells[RHO, follower_face] * follower_cells[LENGTH, follower_face]
+        )
+        u_other, v_other = follower_cells[U, follower_face], follower_cells[V, follower_face]
+        u, v = leader_line.velocity[0], leader_line.velocity[1]
+        leader_part = 0.0
+        leader_inverse = 0.0
+        if not leader_line.rigid:
+            u, v = leader_cells[U, leader_face], leader_cells[V, leader_face]
+            z = leader_cells[RHO, leader_face] * leader_cells[C, leader_face]
+            leader_part = z / (z + z_other)
+            leader_inverse = 1.0 / (
+                leader_cells[RHO, leader_face] * leader_cells[LENGTH, leader_face]
+            )
         # traction on the leader, along (x, y)
         slip = (u_other - u) * x + (v_other - v) * y
-        traction = abs(slip) / (dt * (inverse + own_inverse))
-        if friction < 1e300:
+        traction = abs(slip) / (dt * (follower_inverse + leader_inverse))
+        if friction < WELDED_FRICTION:
             traction = min(traction, max(0.0, friction * facets.contact_states[FACET_P, k]))
         push = traction if slip > 0.0 else -traction
         area = (facets.areas[AREA_X, k] ** 2 + facets.areas[AREA_Y, k] ** 2) ** 0.5
         # velocities along the facet in the middle of the step
-        w = u * x + v * y + 0.5 * dt * push * own_inverse
-        w_other = u_other * x + v_other * y - 0.5 * dt * push * inverse
+        w = u * x + v * y + 0.5 * dt * push * leader_inverse
+        w_other = u_other * x + v_other * y - 0.5 * dt * push * follower_inverse
         force = push * area
-        speed = w + part * (w_other - w)
-        add_force(line.flux, other, force, (x, y), speed)
-        if not own_line.rigid:
-            add_force(own_line.flux, own, -force, (x, y), speed)
+        speed = w + leader_part * (w_other - w)
+        add_force(follower_line.flux, follower_face, force, (x, y), speed)
+        if not leader_line.rigid:
+            add_force(leader_line.flux, leader_face, -force, (x, y), speed)
 
 
 @kernel

@@ -65,7 +65,7 @@ def find_held(facets, count, leader, follower):
 
 
 @compiled_once
-def straighten(points, k, line, pins, others, x_way, y_way):
+def straighten(points, k, line, pins, target_positions, x_way, y_way):
     """The way of node `k`, where the contact ends, to the straight line of both faces there.
 
     See `lay`.  The given way, of its other rules, where there is no such line, and where the line
@@ -75,16 +75,16 @@ def straighten(points, k, line, pins, others, x_way, y_way):
     a = min(int(pins.later_positions[k]), line.shape[1] - 2)
     inwards = -1 if pins.ends_facet[k] else 1
     pin, free = (a + 1, a) if inwards < 0 else (a, a + 1)
-    if not 0.0 < inwards * (others[pin] - k) < 1.0 or others[free] >= 0.0:
+    if not 0.0 < inwards * (target_positions[pin] - k) < 1.0 or target_positions[free] >= 0.0:
         return x_way, y_way
     x_start, y_start = points[0, k + inwards], points[1, k + inwards]
     dx, dy = line[0, free] - x_start, line[1, free] - y_start
     along = (points[0, k] - x_start) * dx + (points[1, k] - y_start) * dy
-    part = min(1.0, max(0.0, along / (dx * dx + dy * dy)))
-    x = x_start + part * dx - points[0, k]
-    y = y_start + part * dy - points[1, k]
-    most = MOST_STRAIGHTENED_WAY**2 * (x_way * x_way + y_way * y_way)
-    if x * x + y * y > most:
+    fraction = min(1.0, max(0.0, along / (dx * dx + dy * dy)))
+    x = x_start + fraction * dx - points[0, k]
+    y = y_start + fraction * dy - points[1, k]
+    largest_square = MOST_STRAIGHTENED_WAY**2 * (x_way * x_way + y_way * y_way)
+    if x * x + y * y > largest_square:
         return x_way, y_way
     return x, y
 
@@ -128,14 +128,22 @@ def is_laid(k, pins, away, length, back, at_end, ends_line):
     return takes and not (ends_line and beside > BESIDE_END_DISTANCE * length)
 
 
+@compiled_once
+def put_end_shift(end_shifts, end, x, y):
+    """Store that a line's end is to be moved by (x, y) in a row of `end_shifts`."""
+    end_shifts[end, 0] = 1.0
+    end_shifts[end, 1] = x
+    end_shifts[end, 2] = y
+
+
 @kernel
-def lay(mover, pins, target, others, how, ways, ends):
+def lay(mover, pins, target, target_positions, rules, shifts, end_shifts):
     """Move new nodes onto the other's new line: the closed part, and what came through.
 
-    mover, target: `LineNodes`; pins: `Pins` of the mover, whose `found` are the feet of its nodes;
-    others (m + 1,): positions of the target's nodes on the mover's line; ways (2, n + 1): scratch;
-    ends (2, 3): for both ends, is it to be moved (by who knows all that meets there), and the way.
-    how: back, straight, part_back.
+    mover, target: `LineNodes`; pins: `Pins` of the mover, whose `later_positions` are the feet of
+    its nodes; target_positions (m + 1,): of the target's nodes on the mover's line; shifts (2, n +
+    1): scratch; end_shifts (2, 3): for both ends, whether it is to be moved (by the caller, with
+    all that meets there), and by how much; rules: back, straight, part_back.
     back: the mover is the leader, whose line holds: its ends alone are laid, what comes through in
     this step, and what lies deep behind.  An end of the contact may lie on a face of the follower
     which begins on the leader's face before that end: both faces hold each other's nodes, so they
@@ -145,110 +153,111 @@ def lay(mover, pins, target, others, how, ways, ends):
     that alone: a finite way in a short step would crush its cells.
     Returns how many inner nodes are moved, -1 where one has gone far into the other body.
     """
-    back, straight, part_back = how
+    back, straight, part_back = rules
     points = mover.new
     line = target.new
     last = points.shape[1] - 1
-    most = line.shape[1] - 1
-    ends[:] = 0.0
+    last_target = line.shape[1] - 1
+    end_shifts[:] = 0.0
     moved = 0
     for k in range(last + 1):
-        ways[0, k] = 0.0
-        ways[1, k] = 0.0
-        found = pins.later_positions[k]
-        if found < 0.0:
+        shifts[0, k] = 0.0
+        shifts[1, k] = 0.0
+        foot = pins.later_positions[k]
+        if foot < 0.0:
             continue
         # the way to its foot, across the face there and along it
-        a = min(int(found), most - 1)
+        a = min(int(foot), last_target - 1)
         dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
         length = (dx * dx + dy * dy) ** 0.5
-        x, y = find_point(line, a, found)
+        x, y = find_point(line, a, foot)
         x, y = x - points[0, k], y - points[1, k]
         outside = (y * dx - x * dy) / length
         beside = abs(x * dx + y * dy) / length
         at_end = k == 0 or k == last
-        ends_line = not straight and is_free_end(target, found)
+        ends_line = not straight and is_free_end(target, foot)
         shortest = min(length, measure_shorter(points, k))
         if not is_laid(k, pins, (outside, beside), shortest, back, at_end, ends_line):
             continue
         if not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length:
             continue
-        way = (x * x + y * y) ** 0.5
+        distance = (x * x + y * y) ** 0.5
         # what was behind before goes back by a part
         if pins.hit_positions[k] < 0.0 and pins.positions[k] >= 0.0:
-            was = measure_distance_before(mover, k, target, pins.positions[k])
-            if was > MATCHED_NODE_DISTANCE * length:
-                scale = max(0.0, 1.0 - (1.0 - part_back) * was / way)
+            distance_before = measure_distance_before(mover, k, target, pins.positions[k])
+            if distance_before > MATCHED_NODE_DISTANCE * length:
+                scale = max(0.0, 1.0 - (1.0 - part_back) * distance_before / distance)
                 x, y = scale * x, scale * y
         if back and pins.held[k]:
-            x, y = straighten(points, k, line, pins, others, x, y)
+            x, y = straighten(points, k, line, pins, target_positions, x, y)
         if (x * x + y * y) ** 0.5 > MOST_LAID * length:
             return -1
         if 0 < k < last:
-            ways[0, k] = x
-            ways[1, k] = y
+            shifts[0, k] = x
+            shifts[1, k] = y
             moved += 1
         else:
-            end = 0 if k == 0 else 1
-            ends[end, 0] = 1.0
-            ends[end, 1] = x
-            ends[end, 2] = y
+            put_end_shift(end_shifts, 0 if k == 0 else 1, x, y)
     for k in range(1, last):
-        points[0, k] += ways[0, k]
-        points[1, k] += ways[1, k]
+        points[0, k] += shifts[0, k]
+        points[1, k] += shifts[1, k]
     return moved
 
 
 @kernel
-def match(points, line, places, hits, held, ends):
+def match(points, line, places, hits, held, end_shifts):
     """Let nodes (2, n + 1) and the other line's that they meet go half of the way each.
 
     Where two lines are mirror images neither leads then.  places (n + 1,): where on the other line
-    the points were on it, or come through it; ends (4, 3): as in `lay`, of the points' line, then
-    of the other one.  Returns how many have met.
+    the points were on it, or come through it; end_shifts (4, 3): as in `lay`, of the points' line,
+    then of the other one.  Returns how many have met.
     """
     last = points.shape[1] - 1
-    most = line.shape[1] - 1
+    last_other = line.shape[1] - 1
     met = 0
-    ends[:] = 0.0
+    end_shifts[:] = 0.0
     for k in range(last + 1):
-        m = int(places[k] + 0.5)
-        if places[k] < 0.0 or abs(places[k] - m) > MATCHED_NODE_DISTANCE:
+        other_node = int(places[k] + 0.5)
+        if places[k] < 0.0 or abs(places[k] - other_node) > MATCHED_NODE_DISTANCE:
             continue
-        x, y = line[0, m] - points[0, k], line[1, m] - points[1, k]
+        x, y = line[0, other_node] - points[0, k], line[1, other_node] - points[1, k]
         # faces that would be mirror images: from node m on, up to node k; or those before these
-        a, b = (m, k - 1) if m < most and k > 0 else (m - 1, k)
-        if a < 0 or b > last - 1:
+        other_face, own_face = (
+            (other_node, k - 1) if other_node < last_other and k > 0 else (other_node - 1, k)
+        )
+        if other_face < 0 or own_face > last - 1:
             continue
-        dx, dy = line[0, a + 1] - line[0, a], line[1, a + 1] - line[1, a]
+        dx, dy = (
+            line[0, other_face + 1] - line[0, other_face],
+            line[1, other_face + 1] - line[1, other_face],
+        )
         if not (held[k] or hits[k] >= 0.0 or y * dx - x * dy < 0.0):
             continue
         square = dx * dx + dy * dy
-        dx, dy = dx - (points[0, b + 1] - points[0, b]), dy - (points[1, b + 1] - points[1, b])
-        way = x * x + y * y
-        most_slip = MATCHED_NODE_DISTANCE * (way + MATCHED_NODE_DISTANCE * square)  # squared
+        dx, dy = (
+            dx - (points[0, own_face + 1] - points[0, own_face]),
+            dy - (points[1, own_face + 1] - points[1, own_face]),
+        )
+        distance_square = x * x + y * y
+        most_slip = MATCHED_NODE_DISTANCE * (
+            distance_square + MATCHED_NODE_DISTANCE * square
+        )  # squared
         slips = (x * dx + y * dy) ** 2 > most_slip * (dx * dx + dy * dy)
         if slips:
             continue
-        if 0.25 * way > MOST_LAID * MOST_LAID * square:
+        if 0.25 * distance_square > MOST_LAID * MOST_LAID * square:
             return -1
         met += 1
         if 0 < k < last:
             points[0, k] += 0.5 * x
             points[1, k] += 0.5 * y
         else:
-            end = 0 if k == 0 else 1
-            ends[end, 0] = 1.0
-            ends[end, 1] = 0.5 * x
-            ends[end, 2] = 0.5 * y
-        if 0 < m < most:
-            line[0, m] -= 0.5 * x
-            line[1, m] -= 0.5 * y
+            put_end_shift(end_shifts, 0 if k == 0 else 1, 0.5 * x, 0.5 * y)
+        if 0 < other_node < last_other:
+            line[0, other_node] -= 0.5 * x
+            line[1, other_node] -= 0.5 * y
         else:
-            end = 2 if m == 0 else 3
-            ends[end, 0] = 1.0
-            ends[end, 1] = -0.5 * x
-            ends[end, 2] = -0.5 * y
+            put_end_shift(end_shifts, 2 if other_node == 0 else 3, -0.5 * x, -0.5 * y)
     return met
 
 
@@ -273,36 +282,36 @@ def fit_plane(points, origin, along, length, line):
 
 
 @kernel
-def measure_clearance_of_plane(points, line, asked):
+def measure_clearance_of_plane(points, line, counts):
     """How much the points may fall before one is near: their heights less MOST_BULGE of a face."""
-    least = 1e300
+    clearance = 1e300
     for k in range(points.shape[1]):
-        if asked[k]:
-            high = -find_depth(line, 0, points[0, k], points[1, k])
-            least = min(least, high - MOST_BULGE * measure_shorter(points, k))
-    return least
+        if counts[k]:
+            height = -find_depth(line, 0, points[0, k], points[1, k])
+            clearance = min(clearance, height - MOST_BULGE * measure_shorter(points, k))
+    return clearance
 
 
 @kernel
 def find_plane_pins(points, line, tolerance, positions):
     """Positions (n,) on a plane of the points that lie on it or behind it; -1.0 for all others."""
-    found = 0
+    pin_count = 0
     for k in range(points.shape[1]):
         x, y = points[0, k], points[1, k]
         positions[k] = -1.0
         if -find_depth(line, 0, x, y) <= tolerance * measure_shorter(points, k):
             positions[k] = find_foot(line, x, y)
-            found += 1
-    return found
+            pin_count += 1
+    return pin_count
 
 
 @kernel
-def follow_plane(points, line, positions, found):
+def follow_plane(points, line, positions, later_positions):
     """Feet of the points that have a position."""
     for k in range(points.shape[1]):
-        found[k] = -1.0
+        later_positions[k] = -1.0
         if positions[k] >= 0.0:
-            found[k] = find_foot(line, points[0, k], points[1, k])
+            later_positions[k] = find_foot(line, points[0, k], points[1, k])
 
 
 @kernel

@@ -68,9 +68,9 @@ class Meetings:
         self.planes = [pair.leader for pair in self.pairs if isinstance(pair, PlanePair)]
         # regridders of blocks whose own surfaces may meet: their boundaries then touch themselves
         self._folding = [
-            (regridder, own)
+            (regridder, folding_pairs)
             for regridder, block in zip(motion.regridders, blocks, strict=False)
-            if (own := [pair for pair in self.pairs if pair.one_block is block])
+            if (folding_pairs := [pair for pair in self.pairs if pair.one_block is block])
         ]
         self.bodies = Bodies(self.surfaces, _find_bodies(blocks, links))
         self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)

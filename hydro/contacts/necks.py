@@ -30,17 +30,17 @@ MOST_FRONT_PART = 0.01
 
 
 @kernel
-def find_thinnest(outlines, inner, sizes, most):
+def find_thinnest(outlines, inner, sizes, widest):
     """The node at which a body is thinnest by its size: (node, its width over its size).
 
     inner (2, N): the next nodes inwards; sizes (N,): of the cells of the block that each node
-    belongs to [m].  Widths above `most` sizes are not looked for: (NO_FACE, most) where there is
+    belongs to [m].  Widths above `widest` sizes are not looked for: (NO_FACE, most) where there is
     none below.
     """
     nodes = outlines.nodes
     boxes = outlines.boxes
     fill_face_boxes(outlines)
-    thinnest = most
+    thinnest = widest
     at = NO_FACE
     for node in range(nodes.shape[1]):
         if outlines.twins[node] < node:

@@ -71,20 +71,20 @@ def fill_face_boxes(outlines):
     nodes = outlines.nodes
     starts = outlines.starts
     boxes = outlines.boxes
-    most = 0.0
+    largest_square = 0.0
     for g in range(boxes.shape[1]):
         first = starts[g * GROUPED_FACES]
         boxes[LEAST_X, g] = boxes[MOST_X, g] = nodes[0, first]
         boxes[LEAST_Y, g] = boxes[MOST_Y, g] = nodes[1, first]
         for a in range(g * GROUPED_FACES, min(starts.shape[0], (g + 1) * GROUPED_FACES)):
-            most = max(most, measure_square(nodes, starts[a]))
+            largest_square = max(largest_square, measure_square(nodes, starts[a]))
             for node in range(starts[a], starts[a] + 2):
                 x, y = nodes[0, node], nodes[1, node]
                 boxes[LEAST_X, g] = min(boxes[LEAST_X, g], x)
                 boxes[MOST_X, g] = max(boxes[MOST_X, g], x)
                 boxes[LEAST_Y, g] = min(boxes[LEAST_Y, g], y)
                 boxes[MOST_Y, g] = max(boxes[MOST_Y, g], y)
-    return most**0.5
+    return largest_square**0.5
 
 
 @compiled_once
@@ -146,7 +146,7 @@ def find_face_behind(outlines, node, body, reach):
     nearest = NO_FACE
     nearest_part = 0.0
     shortest = reach
-    found = NO_FACE
+    face_behind = NO_FACE
     found_part = 0.0
     depth = 0.0
     for g in range(boxes.shape[1]):
@@ -156,25 +156,25 @@ def find_face_behind(outlines, node, body, reach):
             start = outlines.starts[a]
             if outlines.bodies[start] != body:
                 continue
-            part, away = project(nodes, start, x, y)
-            if away < least:
-                least = away
+            fraction, distance_square = project(nodes, start, x, y)
+            if distance_square < least:
+                least = distance_square
                 nearest = start
-                nearest_part = part
+                nearest_part = fraction
             # the way against the node's normal, for faces that look at it
             face_x, face_y = find_unit_normal(nodes, start)
             facing = -(normal_x * face_x + normal_y * face_y)
             if facing > LEAST_FACING and find_depth(nodes, start, x, y) > 0.0:
-                way = away**0.5 / facing
-                if way < shortest:
-                    shortest = way
-                    found = start
-                    found_part = part
-                    depth = away**0.5
+                distance = distance_square**0.5 / facing
+                if distance < shortest:
+                    shortest = distance
+                    face_behind = start
+                    found_part = fraction
+                    depth = distance_square**0.5
     if nearest == NO_FACE:
         return NO_FACE, 0.0, 0.0
     # where the nearest face does not look at the node, it has come in through another one
-    beside = found != NO_FACE and not looks_at_node(outlines, nearest, node)
+    beside = face_behind != NO_FACE and not looks_at_node(outlines, nearest, node)
     size = DEEPEST_NODE_PART * measure_shortest(outlines, node, nearest)
     if 0.0 < nearest_part < 1.0:
         is_inside = find_depth(nodes, nearest, x, y) > (-size if beside else 0.0)
@@ -183,9 +183,9 @@ def find_face_behind(outlines, node, body, reach):
         is_inside = is_inside or (beside and least < size * size)
     if not is_inside or not (beside or least > size * size):
         return NO_FACE, 0.0, 0.0
-    if found == NO_FACE:
+    if face_behind == NO_FACE:
         return nearest, nearest_part, least**0.5
-    return found, found_part, depth
+    return face_behind, found_part, depth
 
 
 @compiled_once
@@ -205,25 +205,25 @@ def push_node(outlines, node, body, reach):
     did."""
     nodes = outlines.nodes
     weights = outlines.weights
-    start, part, depth = find_face_behind(outlines, node, body, reach)
+    start, fraction, depth = find_face_behind(outlines, node, body, reach)
     if start == NO_FACE:
         return False
     length = measure_shortest(outlines, node, start)
     if depth <= DEEPEST_NODE_PART * length:
         return False
     # the node and the two of the face share the way
-    first = weights[start] * (1.0 - part)
-    second = weights[start + 1] * part
-    sum_of_weights = weights[node] + first * (1.0 - part) + second * part
+    first = weights[start] * (1.0 - fraction)
+    second_weight = weights[start + 1] * fraction
+    sum_of_weights = weights[node] + first * (1.0 - fraction) + second_weight * fraction
     if sum_of_weights == 0.0:
         return False
     share = (depth - LEFT_DEPTH_PART * length) / (sum_of_weights * depth)
-    x = nodes[0, start] * (1.0 - part) + nodes[0, start + 1] * part
-    y = nodes[1, start] * (1.0 - part) + nodes[1, start + 1] * part
+    x = nodes[0, start] * (1.0 - fraction) + nodes[0, start + 1] * fraction
+    y = nodes[1, start] * (1.0 - fraction) + nodes[1, start + 1] * fraction
     way_x, way_y = share * (x - nodes[0, node]), share * (y - nodes[1, node])
     move_node(outlines, node, weights[node] * way_x, weights[node] * way_y)
     move_node(outlines, start, -first * way_x, -first * way_y)
-    move_node(outlines, start + 1, -second * way_x, -second * way_y)
+    move_node(outlines, start + 1, -second_weight * way_x, -second_weight * way_y)
     return True
 
 

@@ -57,19 +57,19 @@ def find_nearest(
     """Of points (2, n): the face of a line that is nearest, the part of it where the foot lies, how
     far the point is in front of the line, and how far the line's curve is there [m]."""
     start = line[:, :-1]
-    way = np.diff(line, axis=1)
-    square = np.maximum((way * way).sum(axis=0), np.finfo(float).tiny)
+    steps = np.diff(line, axis=1)
+    square = np.maximum((steps * steps).sum(axis=0), np.finfo(float).tiny)
     away = points[:, :, None] - start[:, None, :]
-    part = np.clip((away * way[:, None, :]).sum(axis=0) / square, 0.0, 1.0)
-    miss = away - part * way[:, None, :]
+    fraction = np.clip((away * steps[:, None, :]).sum(axis=0) / square, 0.0, 1.0)
+    miss = away - fraction * steps[:, None, :]
     distance = np.hypot(*miss)
     face = distance.argmin(axis=1)
     rows = np.arange(points.shape[1])
-    part = part[rows, face]
-    in_front = away[0, rows, face] * way[1, face] - away[1, rows, face] * way[0, face] >= 0.0
+    fraction = fraction[rows, face]
+    in_front = away[0, rows, face] * steps[1, face] - away[1, rows, face] * steps[0, face] >= 0.0
     height = np.where(in_front, 1.0, -1.0) * distance[rows, face]
-    bulge = 0.5 * curvatures[face] * part * (1.0 - part) * square[face]
-    return face, part, height, bulge
+    bulge = 0.5 * curvatures[face] * fraction * (1.0 - fraction) * square[face]
+    return face, fraction, height, bulge
 
 
 def measure_sizes(line: np.ndarray, inner: np.ndarray) -> np.ndarray:
@@ -102,14 +102,14 @@ def find_lying(
     if near.size == 0:
         return positions
     curvatures = measure_curvatures(line)
-    face, part, height, bulge = find_nearest(line, curvatures, points[:, near])
+    face, fraction, height, bulge = find_nearest(line, curvatures, points[:, near])
     size = np.minimum(sizes[near], np.minimum(line_sizes[face], line_sizes[face + 1]))
     is_on = np.abs(height) <= ON_LINE_DISTANCE * np.hypot(*np.diff(line, axis=1))[face]
     bulge = np.clip(BULGE_MARGIN * bulge, -LARGEST_CLOSED_BULGE * size, LARGEST_CLOSED_BULGE * size)
     least = np.minimum(bulge, 0.0) - LARGEST_CLOSED_OVERLAP * size
-    most = np.maximum(bulge, 0.0) + LARGEST_CLOSED_GAP * size
-    lies = (height >= least) & (height <= most) & ~is_on
-    positions[near[lies]] = (face + part)[lies]
+    farthest = np.maximum(bulge, 0.0) + LARGEST_CLOSED_GAP * size
+    lies = (height >= least) & (height <= farthest) & ~is_on
+    positions[near[lies]] = (face + fraction)[lies]
     return positions
 
 
@@ -131,11 +131,11 @@ def check_overlaps(blocks: Sequence[Block], links: Sequence[Link | SlidingContac
     """Raise BadInput where a node of a block lies in another one without a link to it, further than
     is closed at the start."""
     linked = [{id(segment.block) for segment in link.segments} for link in links]
-    for one, other in itertools.combinations(blocks, 2):
-        if any({id(one), id(other)} <= pair for pair in linked):
+    for block, other_block in itertools.combinations(blocks, 2):
+        if any({id(block), id(other_block)} <= pair for pair in linked):
             continue
-        for block, around in ((one, other), (other, one)):
-            _check_overlap(block, around)
+        for inner, outer in ((block, other_block), (other_block, block)):
+            _check_overlap(inner, outer)
 
 
 def _check_overlap(block: Block, around: Block) -> None:
@@ -190,18 +190,18 @@ def _trace(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inner = block.nodes.copy()
     inner[:, 0], inner[:, -1] = block.nodes[:, 1], block.nodes[:, -2]
     inner[:, :, 0], inner[:, :, -1] = inner[:, :, 1], inner[:, :, -2]
-    parts = []
+    pieces = []
     for number, line in enumerate(get_sides(block.nodes)):
         line_inner = get_sides(inner)[number]
-        parts.append((line, measure_sizes(line, line_inner), measure_curvatures(line)))
-    i_min, i_max, j_min, j_max = parts
+        pieces.append((line, measure_sizes(line, line_inner), measure_curvatures(line)))
+    i_min, i_max, j_min, j_max = pieces
     order = j_min, i_max, _turn(j_max), _turn(i_min)
-    line = np.concatenate([part[0][:, :-1] for part in order], axis=1)
-    sizes = np.concatenate([part[1][:-1] for part in order])
-    curvatures = np.concatenate([part[2] for part in order])
+    line = np.concatenate([piece[0][:, :-1] for piece in order], axis=1)
+    sizes = np.concatenate([piece[1][:-1] for piece in order])
+    curvatures = np.concatenate([piece[2] for piece in order])
     return line, sizes, curvatures
 
 
-def _turn(part: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple:
-    line, sizes, curvatures = part
+def _turn(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple:
+    line, sizes, curvatures = piece
     return line[:, ::-1], sizes[::-1], -curvatures[::-1]

@@ -151,8 +151,8 @@ class Surface:
         return np.ascontiguousarray(self._view(rows))
 
     def _view(self, rows: slice | int) -> np.ndarray:
-        part = self.block.rim.rows[rows, self.segment.first : self.segment.last]
-        return part[..., :: self.step]
+        segment_rows = self.block.rim.rows[rows, self.segment.first : self.segment.last]
+        return segment_rows[..., :: self.step]
 
     def gather_void_pressure(self) -> np.ndarray:
         """The pressure in the voids beside the line's faces."""

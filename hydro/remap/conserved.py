@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
@@ -138,6 +139,27 @@ def balance_slivers(
     return content, slivers
 
 
+class CellLimits(NamedTuple):
+    """Linear fields of n cells and what they must keep to at the cells' corners.
+
+    means, slope_x, slope_y (4, n): of mass, both momenta and energy per volume; least, greatest (2,
+    n): density and pressure; floors (2, n): density and c² that are to be left; offsets (4, 2, n):
+    of the corners from the centres [m].
+    """
+
+    means: np.ndarray
+    slope_x: np.ndarray
+    slope_y: np.ndarray
+    least: np.ndarray
+    greatest: np.ndarray
+    floors: np.ndarray
+    offsets: np.ndarray
+
+    def choose(self, which: slice | np.ndarray) -> CellLimits:
+        """The same of some cells."""
+        return CellLimits(*(array[..., which] for array in self))
+
+
 def is_state(eos: EquationOfState, state: np.ndarray) -> np.ndarray:
     """Whether rho, u, v, p (4, ...) are finite, with a density and a c² above 0."""
     with np.errstate(all="ignore"):
@@ -169,9 +191,9 @@ def find_bounds(eos: EquationOfState, state: np.ndarray) -> tuple[np.ndarray, np
 def limit_slopes_to_states(
     eos: EquationOfState, fields: np.ndarray, nodes: np.ndarray, centres
 ) -> int:
-    """Lessen slopes of `fields` (ni, nj, n, 3) in place where corners are no states; how many.
+    """Lessen slopes of `fields` (ni, nj, n, 3) in place where corners are no states.
 
-    The first four are those of `compute_conserved`.
+    Returns in how many cells.  The first four are those of `compute_conserved`.
     nodes (2, ni+1, nj+1), centres (2, ni, nj) [m].
     """
     flow = fields[..., :FLOW_QUANTITIES, :]
@@ -181,44 +203,45 @@ def limit_slopes_to_states(
     least, greatest = find_bounds(eos, state)
     stiffness = eos.sound_speed_squared_part(state[RHO], state[P], eos.parameters)
     corners = nodes[:, :-1, :-1], nodes[:, 1:, :-1], nodes[:, 1:, 1:], nodes[:, :-1, 1:]
-    rows = [
-        *means, *slopes[0], *slopes[1], *least, *greatest, LEAST_LEFT * state[RHO],
-        LEAST_LEFT * stiffness, *(offset for corner in corners for offset in corner - centres),
-    ]  # fmt: skip
-    cells = np.array(rows).reshape(len(rows), -1)
-    factor = np.empty(cells.shape[1])
+    cells = CellLimits(
+        means=means.reshape(FLOW_QUANTITIES, -1),
+        slope_x=slopes[0].reshape(FLOW_QUANTITIES, -1),
+        slope_y=slopes[1].reshape(FLOW_QUANTITIES, -1),
+        least=least.reshape(2, -1),
+        greatest=greatest.reshape(2, -1),
+        floors=LEAST_LEFT * np.array([state[RHO], stiffness]).reshape(2, -1),
+        offsets=np.array([corner - centres for corner in corners]).reshape(4, 2, -1),
+    )
+    factor = np.empty(cells.means.shape[1])
     for start in range(0, factor.size, LOCATED_CELLS_CHUNK):
-        stop = start + LOCATED_CELLS_CHUNK
-        factor[start:stop] = _find_slope_fractions(eos, cells[:, start:stop])
+        chunk = slice(start, start + LOCATED_CELLS_CHUNK)
+        factor[chunk] = _find_slope_fractions(eos, cells.choose(chunk))
     fields[..., SLOPE_X:] *= factor.reshape(fields.shape[:2])[..., None, None]
     return int((factor < 1.0).sum())
 
 
-def _find_slope_fractions(eos: EquationOfState, cells: np.ndarray) -> np.ndarray:
-    """The largest of SLOPE_FRACTIONS (n,) with which all corners of cells (rows, n) are states."""
+def _find_slope_fractions(eos: EquationOfState, cells: CellLimits) -> np.ndarray:
+    """The largest of SLOPE_FRACTIONS (n,) with which all corners of cells are states."""
     to_pressure = make_conversion(type(eos)).to_pressure
-    factor = np.zeros(cells.shape[1])
-    waiting = np.arange(cells.shape[1])
+    factor = np.zeros(cells.means.shape[1])
+    waiting = np.arange(factor.size)
     for fraction in SLOPE_FRACTIONS:
-        means = cells[0:4]
-        slope_x = cells[4:8]
-        slope_y = cells[8:12]
-        least_rho, least_p = cells[12:14]
-        most_rho, most_p = cells[14:16]
-        left_rho, left_c2 = cells[16:18]
         is_good = np.ones(waiting.size, dtype=bool)
         with np.errstate(all="ignore"):
-            for way_x, way_y in cells[18:].reshape(4, 2, -1):
-                rho, x, y, total = means + fraction * (slope_x * way_x + slope_y * way_y)
-                e = (total - 0.5 * (x * x + y * y) / rho) / rho
-                p, _, _, c2 = to_pressure(rho, e, eos.parameters)
-                is_good &= (
-                    (rho > left_rho) & (c2 > left_c2) & (rho >= least_rho) & (rho <= most_rho)
-                )
-                is_good &= (p >= least_p) & (p <= most_p)
+            for offset_x, offset_y in cells.offsets:
+                change = cells.slope_x * offset_x + cells.slope_y * offset_y
+                rho, momentum_x, momentum_y, total = cells.means + fraction * change
+                kinetic = 0.5 * (momentum_x * momentum_x + momentum_y * momentum_y) / rho
+                p, _, _, c2 = to_pressure(rho, (total - kinetic) / rho, eos.parameters)
+                least_rho, least_p = cells.least
+                greatest_rho, greatest_p = cells.greatest
+                floor_rho, floor_c2 = cells.floors
+                is_good &= (rho > floor_rho) & (c2 > floor_c2)
+                is_good &= (rho >= least_rho) & (rho <= greatest_rho)
+                is_good &= (p >= least_p) & (p <= greatest_p)
         factor[waiting[is_good]] = fraction
         waiting = waiting[~is_good]
-        cells = cells[:, ~is_good]
+        cells = cells.choose(~is_good)
         if waiting.size == 0:
             break
     return factor

@@ -57,6 +57,13 @@ MEASURE_ROWS = 4
 # rows of `slopes` of a field: value at mid-time at the cell's centre, gradient
 AT_CENTRE, SLOPE_X, SLOPE_Y = range(3)
 SLOPE_PARTS = 3
+# rows of `metrics`: weights of the differences along both lines, vectors along these, 1/area
+# between them, ways from the centre to the four corners
+WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = range(4)
+LINE_I_X, LINE_I_Y, LINE_J_X, LINE_J_Y, INVERSE_AREA = range(4, 9)
+CORNER_X = 9
+CORNER_Y = 13
+METRIC_ROWS = 17
 
 
 @inlined
@@ -144,14 +151,11 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
         centres[0, i, j] = 0.25 * ((a[0] + c[0]) + (b[0] + d[0])) + offset_x
         centres[1, i, j] = 0.25 * ((a[1] + c[1]) + (b[1] + d[1])) + offset_y
 
-    @compiled_once(allocates=False)
-    def fill_slope(field, state, nodes, i, j, half_dt, lines, slopes):
-        """Bounded slopes of a field in a cell, and its value there at mid-time.
-
-        lines: what `measure_cell` has filled, measures and centres.
-        """
-        measures, centres = lines
-        a, b, c, d = find_corners(nodes, i, j)
+    @inlined
+    def weigh_cell(nodes, i, j, measures, centres, metrics):
+        """What all fields of a cell have in common, into column j of `metrics`."""
+        corners = find_corners(nodes, i, j)
+        a, b, c, d = corners
         line_i, line_j, area = compute_line_geometry(a, b, c, d)
         inverse = 1.0 / area
         if curved:
@@ -159,28 +163,55 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
             line_i, line_j = lean_lines(line_i, line_j, twist, y)
             inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
         cell = i + 1, j + 1
+        metrics[WEIGHT_BEFORE, j], metrics[WEIGHT_AFTER, j] = compute_difference_weights(
+            measures, LENGTH_I, cell, (i, j + 1), (i + 2, j + 1)
+        )
+        metrics[WEIGHT_BELOW, j], metrics[WEIGHT_ABOVE, j] = compute_difference_weights(
+            measures, LENGTH_J, cell, (i + 1, j), (i + 1, j + 2)
+        )
+        metrics[LINE_I_X, j], metrics[LINE_I_Y, j] = line_i
+        metrics[LINE_J_X, j], metrics[LINE_J_Y, j] = line_j
+        metrics[INVERSE_AREA, j] = inverse
+        x = centres[0, i, j]
+        y = centres[1, i, j]
+        metrics[CORNER_X, j] = a[0] - x
+        metrics[CORNER_X + 1, j] = b[0] - x
+        metrics[CORNER_X + 2, j] = c[0] - x
+        metrics[CORNER_X + 3, j] = d[0] - x
+        metrics[CORNER_Y, j] = a[1] - y
+        metrics[CORNER_Y + 1, j] = b[1] - y
+        metrics[CORNER_Y + 2, j] = c[1] - y
+        metrics[CORNER_Y + 3, j] = d[1] - y
+
+    @inlined
+    def fill_slope(field, state, i, j, half_dt, metrics, slopes):
+        """Bounded slopes of a field in a cell, and its value there at mid-time."""
         value = field[i + 1, j + 1]
         before = field[i, j + 1]
         after = field[i + 2, j + 1]
         below = field[i + 1, j]
         above = field[i + 1, j + 2]
-        weight_before, weight_after = compute_difference_weights(
-            measures, LENGTH_I, cell, (i, j + 1), (i + 2, j + 1)
+        along_i = limit(
+            (value - before) * metrics[WEIGHT_BEFORE, j], (after - value) * metrics[WEIGHT_AFTER, j]
         )
-        along_i = limit((value - before) * weight_before, (after - value) * weight_after)
-        weight_before, weight_after = compute_difference_weights(
-            measures, LENGTH_J, cell, (i + 1, j), (i + 1, j + 2)
+        along_j = limit(
+            (value - below) * metrics[WEIGHT_BELOW, j], (above - value) * metrics[WEIGHT_ABOVE, j]
         )
-        along_j = limit((value - below) * weight_before, (above - value) * weight_after)
-        slope_x, slope_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
+        slope_x, slope_y = compute_gradient(
+            along_i,
+            along_j,
+            (metrics[LINE_I_X, j], metrics[LINE_I_Y, j]),
+            (metrics[LINE_J_X, j], metrics[LINE_J_Y, j]),
+            metrics[INVERSE_AREA, j],
+        )
         # nowhere in the cell beyond the values around
         lowest = min(value, min(min(before, after), min(below, above)))
         highest = max(value, max(max(before, after), max(below, above)))
-        x = centres[0, i, j]
-        y = centres[1, i, j]
         slope_fraction = 1.0
-        for corner in (a, b, c, d):
-            change = slope_x * (corner[0] - x) + slope_y * (corner[1] - y)
+        for corner in range(4):
+            change = (
+                slope_x * metrics[CORNER_X + corner, j] + slope_y * metrics[CORNER_Y + corner, j]
+            )
             slope_fraction = min(slope_fraction, bound(change, value, lowest, highest))
         slope_x *= slope_fraction
         slope_y *= slope_fraction
@@ -189,15 +220,27 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
         slopes[SLOPE_X, i, j] = slope_x
         slopes[SLOPE_Y, i, j] = slope_y
 
+    @compiled_once(allocates=False)
+    def weigh_row(nodes, i, measures, centres, metrics):
+        """`weigh_cell` of the cells of a row."""
+        for j in range(centres.shape[2]):
+            weigh_cell(nodes, i, j, measures, centres, metrics)
+
+    @compiled_once(allocates=False)
+    def fill_row(field, state, i, half_dt, metrics, slopes):
+        """`fill_slope` of the cells of a row."""
+        for j in range(slopes.shape[2]):
+            fill_slope(field, state, i, j, half_dt, metrics, slopes)
+
     @kernel(allocates=False)
     def predict(values, state, nodes, rim, half_dt, rows, scratch):
         """Slopes (n, 3, ni, nj) of fields (n, ni + 2, nj + 2) in the cells that a step reads.
 
         These are the rows first..last - 1 of cells of `rows`, one more on either side, and the
-        cells along all sides.  scratch: measures (4, ni + 2, nj + 2), centres (2, ni, nj) and the
-        slopes, which are filled.
+        cells along all sides.  scratch: measures (4, ni + 2, nj + 2), centres (2, ni, nj), the
+        slopes, and metrics (METRIC_ROWS, nj) of a row of cells, which are filled.
         """
-        measures, centres, slopes = scratch
+        measures, centres, slopes, metrics = scratch
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         # rows whose slopes the step reads: its own and one on either side
@@ -214,23 +257,19 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
         # and beyond the sides
         place_ghosts(rim, LENGTH_GHOST, measures[LENGTH_I])
         place_ghosts(rim, LENGTH_GHOST, measures[LENGTH_J])
-        # slopes field by field
         for q in range(values.shape[0]):
             place_ghosts(rim, find_carried_row(q) + CARRIED_GHOST, values[q])
-            for i in range(ni):
-                near = low <= i < high or i == 0 or i == ni - 1
-                for j in range(nj):
-                    if near or j == 0 or j == nj - 1:
-                        fill_slope(
-                            values[q],
-                            state,
-                            nodes,
-                            i,
-                            j,
-                            half_dt,
-                            (measures, centres),
-                            slopes[q],
-                        )
+        # slopes row by row, all fields of each
+        for i in range(ni):
+            if low <= i < high or i == 0 or i == ni - 1:
+                weigh_row(nodes, i, measures, centres, metrics)
+                for q in range(values.shape[0]):
+                    fill_row(values[q], state, i, half_dt, metrics, slopes[q])
+                continue
+            for j in (0, nj - 1):
+                weigh_cell(nodes, i, j, measures, centres, metrics)
+                for q in range(values.shape[0]):
+                    fill_slope(values[q], state, i, j, half_dt, metrics, slopes[q])
 
     return predict
 
@@ -281,30 +320,54 @@ def make_carry(geometry: Geometry):
         return x, y
 
     @compiled_once(allocates=False)
-    def fill_faces_i(slopes, centres, grids, mass_i, i, faces):
-        """Values (nj,) at the faces between the rows of cells i - 1 and i; none along the sides."""
-        if i == 0 or i == centres.shape[1]:
-            return
+    def fill_middles_i(grids, i, middles):
+        """Middles (2, nj) of the faces between the rows of cells i - 1 and i."""
+        for j in range(grids[0].shape[2] - 1):
+            middles[0, j], middles[1, j] = find_middle(grids, i, j, i, j + 1)
+
+    @compiled_once(allocates=False)
+    def fill_middles_j(grids, i, middles):
+        """Middles (2, nj + 1) of the faces between the cells of a row."""
+        for j in range(grids[0].shape[2]):
+            middles[0, j], middles[1, j] = find_middle(grids, i + 1, j, i, j)
+
+    @compiled_once(allocates=False)
+    def fill_faces_i(slopes, centres, mass_i, i, middles, faces):
+        """Values (nj,) at the faces between the rows of cells i - 1 and i, not along the sides."""
         for j in range(centres.shape[2]):
-            giver = i - 1 if mass_i[i, j] > 0.0 else i
-            x, y = find_middle(grids, i, j, i, j + 1)
-            faces[j] = find_value(slopes, centres, giver, j, x, y)
+            before = find_value(slopes, centres, i - 1, j, middles[0, j], middles[1, j])
+            after = find_value(slopes, centres, i, j, middles[0, j], middles[1, j])
+            faces[j] = before if mass_i[i, j] > 0.0 else after
 
     @compiled_once(allocates=False)
-    def fill_faces_j(slopes, centres, grids, mass_j, i, faces):
+    def fill_faces_j(slopes, centres, mass_j, i, middles, faces):
         """Values (nj + 1,) at the faces between the cells of a row; none along the sides."""
-        for j in range(1, centres.shape[2]):
-            giver = j - 1 if mass_j[i, j] > 0.0 else j
-            x, y = find_middle(grids, i + 1, j, i, j)
-            faces[j] = find_value(slopes, centres, i, giver, x, y)
+        for k in range(centres.shape[2] - 1):
+            x = middles[0, k + 1]
+            y = middles[1, k + 1]
+            before = find_value(slopes, centres, i, k, x, y)
+            after = find_value(slopes, centres, i, k + 1, x, y)
+            faces[k + 1] = before if mass_j[i, k + 1] > 0.0 else after
 
     @compiled_once(allocates=False)
-    def find_change(value, i, j, masses, faces, sides):
-        """Rate of mass times what is carried beyond `value`, out of a cell.
+    def gather_changes(field, i, masses, faces, changes):
+        """Rates of mass times what is carried beyond the cell's value, out of the cells of a row.
 
-        masses: rates of mass through both pairs of faces; faces: the values there; sides: what the
-        rim has of the faces along the sides (rim, row).
+        faces: values at the faces of the row, those along the sides apart: there nothing passes.
         """
+        mass_i, mass_j = masses
+        low, high, face_j = faces
+        for j in range(changes.shape[0]):
+            value = field[i + 1, j + 1]
+            before = mass_i[i, j] * (low[j] - value)
+            after = mass_i[i + 1, j] * (high[j] - value)
+            below = mass_j[i, j] * (face_j[j] - value)
+            above = mass_j[i, j + 1] * (face_j[j + 1] - value)
+            changes[j] = (after - before) + (above - below)
+
+    @inlined
+    def find_change(value, i, j, masses, faces, sides):
+        """The same of a cell along the sides; sides: what the rim has of these (rim, row)."""
         mass_i, mass_j = masses
         low, high, face_j = faces
         rim, row = sides
@@ -319,6 +382,26 @@ def make_carry(geometry: Geometry):
         )
         return (after - before) + (above - below)
 
+    @compiled_once(allocates=False)
+    def fill_masses(state, nodes, excess, masses, i, dt, left):
+        """Masses (nj,) that are left in the cells of a row."""
+        mass_i, mass_j = masses
+        ni = mass_i.shape[0] - 1
+        nj = left.shape[0]
+        for j in range(nj):
+            volume = measure_volume(nodes, i, j, weigh_volume)
+            leaving = (mass_i[i + 1, j] - mass_i[i, j]) + (mass_j[i, j + 1] - mass_j[i, j])
+            left[j] = volume * state[RHO, i + 1, j + 1] - dt * leaving
+        step = 1 if i == 0 or i == ni - 1 else nj - 1
+        for j in range(0, nj, step):
+            left[j] += find_excess(excess, i, j, ni, nj) * state[RHO, i + 1, j + 1]
+
+    @compiled_once(allocates=False)
+    def keep_changes(old, changes, left, dt, i, new):
+        """New values of the cells of a row."""
+        for j in range(left.shape[0]):
+            new[i + 1, j + 1] = old[i + 1, j + 1] - dt * changes[j] / left[j]
+
     @kernel
     def carry(values, state, grids, sides, masses, dt, rows, scratch):
         """New values of fields after a step.
@@ -331,31 +414,39 @@ def make_carry(geometry: Geometry):
         """
         old, new = values
         rim, excess = sides
-        nodes = grids[0]
         mass_i, mass_j = masses
         slopes, centres = scratch
         first, last = rows
         ni = centres.shape[1]
         nj = centres.shape[2]
-        low = np.empty(nj)
-        high = np.empty(nj)
-        face_j = np.empty(nj + 1)
-        for q in range(old.shape[0]):
-            row = find_carried_row(q)
-            fill_faces_i(slopes[q], centres, grids, mass_i, first, high)
-            for i in range(first, last):
-                # the faces towards +i of the row before are those towards -i of this one
-                low, high = high, low
-                fill_faces_i(slopes[q], centres, grids, mass_i, i + 1, high)
-                fill_faces_j(slopes[q], centres, grids, mass_j, i, face_j)
-                for j in range(nj):
-                    volume = measure_volume(nodes, i, j, weigh_volume)
-                    volume += find_excess(excess, i, j, ni, nj)
-                    leaving = (mass_i[i + 1, j] - mass_i[i, j]) + (mass_j[i, j + 1] - mass_j[i, j])
-                    mass = volume * state[RHO, i + 1, j + 1] - dt * leaving
+        middles_i = np.empty((2, nj))
+        middles_j = np.empty((2, nj + 1))
+        lows = np.zeros((old.shape[0], nj))
+        highs = np.zeros((old.shape[0], nj))
+        face_j = np.zeros(nj + 1)
+        left = np.empty(nj)
+        changes = np.empty(nj)
+        for i in range(first - 1, last):
+            # the faces towards +i of the row before are those towards -i of this one
+            lows, highs = highs, lows
+            if 0 <= i < ni - 1:
+                fill_middles_i(grids, i + 1, middles_i)
+                for q in range(old.shape[0]):
+                    fill_faces_i(slopes[q], centres, mass_i, i + 1, middles_i, highs[q])
+            if i < first:
+                continue
+            fill_middles_j(grids, i, middles_j)
+            fill_masses(state, grids[0], excess, masses, i, dt, left)
+            for q in range(old.shape[0]):
+                fill_faces_j(slopes[q], centres, mass_j, i, middles_j, face_j)
+                faces = lows[q], highs[q], face_j
+                gather_changes(old[q], i, masses, faces, changes)
+                row = find_carried_row(q)
+                step = 1 if i == 0 or i == ni - 1 else nj - 1
+                for j in range(0, nj, step):
                     value = old[q, i + 1, j + 1]
-                    change = find_change(value, i, j, masses, (low, high, face_j), (rim, row))
-                    new[q, i + 1, j + 1] = value - dt * change / mass
+                    changes[j] = find_change(value, i, j, masses, faces, (rim, row))
+                keep_changes(old[q], changes, left, dt, i, new[q])
 
     return carry
 
@@ -381,6 +472,7 @@ class Transport:
         self.measures[[SHIFT_I, SHIFT_J]] = 0.0
         self.centres = np.zeros((2, ni, nj))
         self.slopes = np.zeros((count, SLOPE_PARTS, ni, nj))
+        self.metrics = np.zeros((METRIC_ROWS, nj))
 
     def gather(self, block: Any) -> None:
         """Phase 2, before the couplings fill what is beyond the sides: see `gather`."""
@@ -391,7 +483,8 @@ class Transport:
         predict = make_predict(block.geometry, self.limit)
         predict(
             block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
-            (block.rows.start, block.rows.stop), (self.measures, self.centres, self.slopes),
+            (block.rows.start, block.rows.stop),
+            (self.measures, self.centres, self.slopes, self.metrics),
         )  # fmt: skip
 
     def trace(self, block: Any) -> None:

@@ -99,7 +99,7 @@ def make_flow_kernels(
     pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
     i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
     j_faces = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
-    force_i, force_j = (scratch.FORCE_I_X, scratch.FORCE_J_X) if is_solid else (0, 0)
+    force_i, force_j = (scratch.STRESS_I, scratch.STRESS_J) if is_solid else (0, 0)
     choice = low_mach, opens_voids
     fill_upwind_i = make_upwind(
         *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, *choice, force_i
@@ -137,7 +137,7 @@ def make_flow_kernels(
         i_faces,
         (scratch.X_LOW, scratch.X_LOW + 1),
         (scratch.SHEAR_BEFORE, scratch.SHEAR),
-        scratch.FORCE_I_X,
+        scratch.STRESS_I,
         scratch.FLUX_I_MASS,
         scratch.SPEED_I_X,
         geometry,
@@ -146,7 +146,7 @@ def make_flow_kernels(
         j_faces,
         (scratch.X_HIGH, scratch.X_LOW),
         (scratch.SHEAR - 1, scratch.SHEAR),
-        scratch.FORCE_J_X,
+        scratch.STRESS_J,
         scratch.FLUX_J_MASS,
         scratch.SPEED_J_X,
         geometry,
@@ -176,6 +176,7 @@ def make_flow_kernels(
     def load_stress(solid, row, start, count, Z):
         """What the cells of a row have of their stress."""
         copy_row(solid.shear, row, start, count, Z, scratch.SHEAR + 1)
+        copy_row(solid.shear_wave, row, start, count, Z, scratch.SHEAR_WAVE + 1)
         copy_rows(solid.pull, row, start, count, Z, scratch.STRESS_X + 1)
         if curved:
             copy_rows(solid.hoop, row, start, count, Z, scratch.STRESS_SPREAD + 1)
@@ -297,7 +298,7 @@ def make_flow_kernels(
                     )
             elif row >= first_row:
                 if is_solid:
-                    copy_rows(old[3].force_i, row, first_column, cells, Z, scratch.FORCE_I_X + 1)
+                    copy_rows(old[3].stress_i, row, first_column, cells, Z, scratch.STRESS_I + 1)
                 fill_upwind_i(Z, whole)
                 fill_flux_i(Z, whole, parameters)
                 first_face = min(first_hll_cell, first_hll_before)
@@ -328,7 +329,7 @@ def make_flow_kernels(
             if inside:
                 if is_solid:
                     copy_rows(
-                        old[3].force_j, row, first_column, cells + 1, Z, scratch.FORCE_J_X + 1
+                        old[3].stress_j, row, first_column, cells + 1, Z, scratch.STRESS_J + 1
                     )
                 fill_upwind_j(Z, whole)
                 fill_flux_j(Z, whole, parameters)
@@ -398,6 +399,7 @@ def make_flow_kernels(
             if is_solid:
                 for k in range(SCRATCH_SPAN):
                     Z[scratch.SHEAR_BEFORE + k] = Z[scratch.SHEAR + k]
+                    Z[scratch.SHEAR_WAVE_BEFORE + k] = Z[scratch.SHEAR_WAVE + k]
             row += 1
         least = 1e300
         for q in range(TOTAL_ROWS):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from shockgrid.hydro.formulas import riemann
 from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
-from shockgrid.hydro.formulas.strength import add_shear_wave, compute_shear_contact
+from shockgrid.hydro.formulas.strength import compute_shear_contact
 from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
@@ -57,7 +57,7 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
     """
 
     @inlined
-    def trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters):
+    def trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
         c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_voided`).  The
@@ -72,7 +72,7 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
         rho = rho if is_state else rho_of_cell
         c2 = c2 if is_state else c2_of_cell
         if is_solid:
-            c2 = add_shear_wave(c2, shear, rho)
+            c2 = c2 + shear_wave
         return (
             rho,
             u if is_state else u_of_cell,
@@ -84,8 +84,8 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
 
     @inlined
     def load(Z, k):
-        """What is traced: predicted state, gradients, own state and c², whether torn, shear
-        modulus, centre."""
+        """What is traced: predicted state, gradients, own state and c², whether torn, what
+        shear adds to c², centre."""
         return (
             (
                 Z[scratch.RHO_HALF + k],
@@ -111,7 +111,7 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
                 Z[scratch.C2 + k],
             ),
             Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK,
-            Z[scratch.SHEAR + k] if is_solid else 0.0,
+            Z[scratch.SHEAR_WAVE + k] if is_solid else 0.0,
             Z[scratch.X_CENTRE + k],
             Z[scratch.Y_CENTRE + k],
         )
@@ -127,9 +127,9 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, shear, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, shear_wave, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
-            inwards = trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters)
+            inwards = trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters)
             fell_back = put(Z, scratch.IN, k, inwards)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
@@ -137,30 +137,23 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, shear, x, y = load(Z, k)
+            half, gradients, of_cell, voided_energy, shear_wave, x, y = load(Z, k)
             dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
             down_dx, down_dy = Z[scratch.X_J + k] - x, Z[scratch.Y_J + k] - y
             up_dx, up_dy = Z[scratch.X_J + k + 1] - x, Z[scratch.Y_J + k + 1] - y
-            out = trace(half, gradients, of_cell, voided_energy, shear, dx, dy, parameters)
+            out = trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters)
             fell_back = put(Z, scratch.OUT, k, out)
             down = trace(
-                half, gradients, of_cell, voided_energy, shear, down_dx, down_dy, parameters
+                half, gradients, of_cell, voided_energy, shear_wave, down_dx, down_dy, parameters
             )
             fell_back += put(Z, scratch.DOWN, k, down)
-            up = trace(half, gradients, of_cell, voided_energy, shear, up_dx, up_dy, parameters)
+            up = trace(
+                half, gradients, of_cell, voided_energy, shear_wave, up_dx, up_dy, parameters
+            )
             fell_back += put(Z, scratch.UP, k, up)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     return fill_traces_in, fill_traces
-
-
-@inlined
-def compute_stress_on(Z, force, face, k):
-    """s_nn of a face [Pa], from the rows of the force there and of its normal times area."""
-    area_x = Z[face + k]
-    area_y = Z[face + SCRATCH_SPAN + k]
-    work = Z[force + k] * area_x + Z[force + SCRATCH_SPAN + k] * area_y
-    return work / (area_x * area_x + area_y * area_y)
 
 
 def make_upwind(
@@ -170,8 +163,8 @@ def make_upwind(
 
     Scratch offsets of the densities traced on both sides, of the faces' normals and of the torn
     energies and acoustic weights of the cells on the left.  `low_mach`: the limiter has acoustic
-    weights; `opens_voids`: the material has void energies; `force`: of a solid, the row of forces
-    of its stress on the faces.
+    weights; `opens_voids`: the material has void energies; `force`: of a solid, the first row of
+    its stress on the faces.
     """
 
     @compiled_once(allocates=False)
@@ -208,8 +201,8 @@ def make_upwind(
             left_stress = 0.0
             right_stress = 0.0
             if force:
-                left_stress = compute_stress_on(Z, force, face_row, k)
-                right_stress = compute_stress_on(Z, force + 2 * SCRATCH_SPAN, face_row, k)
+                left_stress = Z[force + k]
+                right_stress = Z[force + 2 * SCRATCH_SPAN + k]
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l - left_stress, w_l, s_l), (rho_r, p_r - right_stress, w_r, s_r), square
             )
@@ -360,8 +353,8 @@ def make_hll_flux(
             c2_l = Z[left_row + 4 * SCRATCH_SPAN + k]
             c2_r = Z[right_row + 4 * SCRATCH_SPAN + k]
             if force:
-                p_l = p_l - compute_stress_on(Z, force, face_row, k)
-                p_r = p_r - compute_stress_on(Z, force + 2 * SCRATCH_SPAN, face_row, k)
+                p_l = p_l - Z[force + k]
+                p_r = p_r - Z[force + 2 * SCRATCH_SPAN + k]
             # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
@@ -417,39 +410,32 @@ def make_shear_flux(faces, nodes, shears, force, flux, speed, geometry: Geometry
         for k in range(1, n + 1):
             area_x = Z[face + k]
             area_y = Z[face + SCRATCH_SPAN + k]
-            square = area_x * area_x + area_y * area_y
-            inverse = 1.0 / square
-            area = square**0.5
-            # along the face (-area_y, area_x): speeds times its area, stresses on it
-            speed_l = Z[left + 2 * SCRATCH_SPAN + k] * area_x
-            speed_l -= Z[left + SCRATCH_SPAN + k] * area_y
-            speed_r = Z[right + 2 * SCRATCH_SPAN + k] * area_x
-            speed_r -= Z[right + SCRATCH_SPAN + k] * area_y
-            stress_l = Z[force + SCRATCH_SPAN + k] * area_x - Z[force + k] * area_y
-            stress_r = Z[force + 3 * SCRATCH_SPAN + k] * area_x
-            stress_r -= Z[force + 2 * SCRATCH_SPAN + k] * area_y
+            area = (area_x * area_x + area_y * area_y) ** 0.5
+            inverse = 1.0 / area
+            nx = area_x * inverse
+            ny = area_y * inverse
+            speed_l = Z[left + 2 * SCRATCH_SPAN + k] * nx - Z[left + SCRATCH_SPAN + k] * ny
+            speed_r = Z[right + 2 * SCRATCH_SPAN + k] * nx - Z[right + SCRATCH_SPAN + k] * ny
             stress, speed_along = compute_shear_contact(
-                ((Z[left + k] * Z[shear_l + k]) ** 0.5, speed_l, stress_l * inverse * area),
-                ((Z[right + k] * Z[shear_r + k]) ** 0.5, speed_r, stress_r * inverse * area),
+                ((Z[left + k] * Z[shear_l + k]) ** 0.5, speed_l, Z[force + SCRATCH_SPAN + k]),
+                ((Z[right + k] * Z[shear_r + k]) ** 0.5, speed_r, Z[force + 3 * SCRATCH_SPAN + k]),
             )
-            # stress is that on the face times its area: force along it, and its work
-            pull = stress / area
-            Z[flux + SCRATCH_SPAN + k] += pull * area_y
-            Z[flux + 3 * SCRATCH_SPAN + k] -= pull * speed_along
+            # its force along the face, and what that does
+            Z[flux + SCRATCH_SPAN + k] += stress * area_y
+            Z[flux + 3 * SCRATCH_SPAN + k] -= stress * speed_along * area
             if curved:
                 plane_area_x = 0.5 * (
                     (Z[node_b + SCRATCH_SPAN + k] - Z[node_a + SCRATCH_SPAN + k])
                     + (Z[node_b + 3 * SCRATCH_SPAN + k] - Z[node_a + 3 * SCRATCH_SPAN + k])
                 )
-                Z[flux + 4 * SCRATCH_SPAN + k] -= pull * plane_area_x
-                Z[flux + 5 * SCRATCH_SPAN + k] -= pull * area_x
+                Z[flux + 4 * SCRATCH_SPAN + k] -= stress * plane_area_x
+                Z[flux + 5 * SCRATCH_SPAN + k] -= stress * area_x
             else:
-                Z[flux + 2 * SCRATCH_SPAN + k] -= pull * area_x
+                Z[flux + 2 * SCRATCH_SPAN + k] -= stress * area_x
             # velocity of the contact: across the face as fast as the contact in HLLC
-            speed_across = (
-                Z[scratch.PUSH + k] / Z[scratch.DRAG + k] + Z[face + 2 * SCRATCH_SPAN + k]
-            )
-            Z[speed + k] = (speed_across * area_x - speed_along * area_y) * inverse
-            Z[speed + SCRATCH_SPAN + k] = (speed_across * area_y + speed_along * area_x) * inverse
+            speed_across = Z[scratch.PUSH + k] / Z[scratch.DRAG + k]
+            speed_across = (speed_across + Z[face + 2 * SCRATCH_SPAN + k]) * inverse
+            Z[speed + k] = speed_across * nx - speed_along * ny
+            Z[speed + SCRATCH_SPAN + k] = speed_across * ny + speed_along * nx
 
     return add_shear_flux

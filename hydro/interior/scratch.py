@@ -96,12 +96,15 @@ RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
 LEAST_C2, FIRST_ORDER, SUM_MASS, SUM_X, SUM_Y, SUM_ENERGY = _rows(6)
 SUM_VOIDED, SUM_EMPTIED = _rows(2)
-# solids alone: shear modulus of this row's cells and the row before's, force of the deviatoric
-# stress per volume; axisymmetric: s_rr - s_tt and s_tt in the middle of a cell at mid-time
-SHEAR, SHEAR_BEFORE, STRESS_X, STRESS_Y, STRESS_SPREAD, STRESS_HOOP = _rows(6)
-# forces of the deviatoric stress on faces towards -i and -j, traced from the cells before and after
-FORCE_I = FORCE_I_X, FORCE_I_Y, FORCE_I_X_AFTER, FORCE_I_Y_AFTER = _rows(4)
-FORCE_J = FORCE_J_X, FORCE_J_Y, FORCE_J_X_AFTER, FORCE_J_Y_AFTER = _rows(4)
+# solids alone: shear modulus of this row's cells and the row before's, what it adds to c²; force of
+# the deviatoric stress per volume; axisymmetric: s_rr - s_tt and s_tt in a cell at mid-time
+SHEAR, SHEAR_BEFORE, SHEAR_WAVE, SHEAR_WAVE_BEFORE = _rows(4)
+STRESS_X, STRESS_Y, STRESS_SPREAD, STRESS_HOOP = _rows(4)
+# s_nn and s_nt on the faces towards -i and -j, traced from the cells before, then from those after
+STRESS_I = next(_next)
+_rows(3)
+STRESS_J = next(_next)
+_rows(3)
 # part of the pressure that is the stress on the upwind side's face; velocity of faces' contacts
 STRESS_SIDE = next(_next)
 SPEED_I_X, SPEED_I_Y = _rows(2)

@@ -11,7 +11,6 @@ from shockgrid.hydro.eos.base import make_leaving_part
 from shockgrid.hydro.eos.conversion import make_conversion
 from shockgrid.hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
-from shockgrid.hydro.formulas.strength import add_shear_wave
 from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.rows import LEAST_C2
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
@@ -103,7 +102,7 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                     inverse_area = 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
                 wave_c2 = c2
                 if is_solid:
-                    wave_c2 = add_shear_wave(c2, Z[scratch.SHEAR_BEFORE + k], rho)
+                    wave_c2 = c2 + Z[scratch.SHEAR_WAVE_BEFORE + k]
                 Z[scratch.RATE_NEW + k], Z[scratch.CROWDING_NEW + k] = compute_rate(
                     u - Z[scratch.W_X + k] * inverse_dt,
                     v - Z[scratch.W_Y + k] * inverse_dt,

@@ -224,24 +224,25 @@ def fill_stress_ghosts(shear, spans, first, sides, rim):
 
 
 @compiled_once(allocates=False)
-def press_with_stress(rim, first, k, shear):
+def press_with_stress(rim, first, k, shear_wave):
     """Let the trace of a face have its normal stress for a pressure, and c_l for a sound speed."""
     nx, ny = find_normal(rim, k)
     s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_TRACE, k)
     s_nn, _, _ = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
-    c2 = add_shear_wave(rim[C2_TRACE, k], shear, rim[RHO_TRACE, k])
+    c2 = rim[C2_TRACE, k] + shear_wave
     rim[P_TRACE, k] -= s_nn
     rim[C2_TRACE, k] = c2
     rim[C_TRACE, k] = c2**0.5
 
 
 @kernel(allocates=False)
-def trace_stress_moving(slopes, centres, shear, spans, first, rim):
+def trace_stress_moving(slopes, centres, arrays, spans, first, rim):
     """Stress in the traces at the faces of the spans (n, 2), at the old time.
 
-    slopes (4, 3, ni, nj), centres: of `hydro.carried.transport`, of the fields of a solid.
+    slopes (4, 3, ni, nj), centres: of `hydro.carried.transport`, of the fields of a solid; arrays:
+    `SolidArrays`.
     """
-    ni, nj = shear.shape
+    ni, nj = arrays.shear.shape
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
             _, i, j = find_cell_of_face(k, ni, nj)
@@ -253,7 +254,7 @@ def trace_stress_moving(slopes, centres, shear, spans, first, rim):
                 find_value(slopes[S_XY], centres, i, j, x, y),
             )
             put_stress(rim, first, CARRIED_TRACE, k, stress)
-            press_with_stress(rim, first, k, shear[i, j])
+            press_with_stress(rim, first, k, arrays.shear_wave[i, j])
 
 
 @inlined
@@ -293,17 +294,19 @@ def pull_along(rim, k, stress, speed, curved):
 
 
 @kernel(allocates=False)
-def trace_stress(shear, plan, wave_law, first, curved, sides, rim):
+def trace_stress(arrays, plan, wave_law, first, curved, sides, rim):
     """Stress in the traces on the moved faces; fluxes of walls and open sides, with it.
 
-    plan: walls and open sides of `PerimeterPlan`.  sides (4, faces) is filled: every face slips
-    without friction, and goes as fast as it sweeps, until a coupling says otherwise.
+    arrays: `SolidArrays`; plan: walls and open sides of `PerimeterPlan`.  sides (4, faces) is
+    filled: every face slips without friction, and goes as fast as it sweeps, until a coupling says
+    otherwise.
     """
+    shear = arrays.shear
     ni, nj = shear.shape
     walls, opened = plan
     for k in range(rim.shape[1]):
         _, i, j = find_cell_of_face(k, ni, nj)
-        press_with_stress(rim, first, k, shear[i, j])
+        press_with_stress(rim, first, k, arrays.shear_wave[i, j])
         sides[SHEAR_STRESS, k] = 0.0
         sides[SPEED_ALONG, k] = find_free_speed_along(rim, first, k, shear[i, j], RHO_TRACE)
         nx, ny = rim[NX, k], rim[NY, k]

@@ -6,7 +6,7 @@ beside the phases of the flow (`hydro.phases`):
     start     shear modulus; ghosts beyond walls, normal stress at the faces of the sides
     predict   ghosts beyond contacts, stress at mid-time and its divergence        theory F20.3
     trace     stress at the faces of the sides, in the fluxes of walls and open sides
-    prepare   forces of the stress on the faces inside, for the flow's update      theory F20.5
+    prepare   stress on the faces inside, for the flow's update                    theory F20.5
     relax     after fluxes and fields: strain, rotation and yield                  theory F20.8
 """
 
@@ -25,7 +25,7 @@ from shockgrid.hydro.eos.conversion import (
     has_voids,
     open_voids,
 )
-from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART
+from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART, add_shear_wave
 from shockgrid.hydro.interior.solid import make_solid_arrays
 from shockgrid.hydro.rows import RHO, P
 from shockgrid.hydro.strength.laws.base import StrengthLaw
@@ -33,7 +33,7 @@ from shockgrid.hydro.strength.rates import (
     EQUIVALENT,
     PLASTIC_STRAIN,
     RATE_ROWS,
-    make_fill_forces,
+    make_fill_face_stress,
     make_measure_rates,
     make_predict_rates,
     make_predict_stress,
@@ -126,6 +126,9 @@ class Stress:
         shear = self._find_shear(block, held, block.get_start("carried"))
         torn = has_voids(held, slice(None), slice(None))
         self.arrays.shear[...] = np.where(torn, 0.0, shear)
+        rho = held[0][RHO, 1:-1, 1:-1]
+        with np.errstate(all="ignore"):
+            self.arrays.shear_wave[...] = add_shear_wave(0.0, self.arrays.shear, rho)
         start_stress(
             block.get_start("carried"), block.start, self.arrays.shear, block.plan.walls,
             block.plan.inwards, self.FIRST_FIELD, self.sides, block.rim.rows,
@@ -159,21 +162,21 @@ class Stress:
         """Phase 2, at the end: the traces at faces that go with the flow."""
         transport = block.transport
         trace_stress_moving(
-            transport.slopes, transport.centres, self.arrays.shear, block.plan.flowing_spans,
+            transport.slopes, transport.centres, self.arrays, block.plan.flowing_spans,
             self.FIRST_FIELD, block.rim.rows,
         )  # fmt: skip
 
     def trace(self, block: Any) -> None:
         """Phase 6, with the traces of the sides known, before the couplings' fluxes."""
         trace_stress(
-            self.arrays.shear, (block.plan.walls, block.plan.opened), block.wave_law,
+            self.arrays, (block.plan.walls, block.plan.opened), block.wave_law,
             self.FIRST_FIELD, block.geometry.curved, self.sides, block.rim.rows,
         )  # fmt: skip
 
     def prepare(self, block: Any) -> None:
-        """Phase 6, before the flow's update: forces on the faces inside."""
+        """Phase 6, before the flow's update: stress on the faces inside."""
         transport = block.transport
-        make_fill_forces(block.geometry)(
+        make_fill_face_stress(block.geometry)(
             transport.slopes, transport.centres, block.nodes, block.nodes_new,
             (block.rows.start, block.rows.stop), self.arrays,
         )  # fmt: skip

@@ -281,12 +281,12 @@ def fill_quasi_1d(boundary: np.ndarray, out: np.ndarray) -> None:
     nj = out.shape[2] - 1
     for spacing, j in zip(spacings, (0, -1), strict=True):
         fill_arc_spacing(*np.ascontiguousarray(boundary[:, :, j]), spacing)
-    low = spacings[0, 1:-1, None]
+    low_spacing = spacings[0, 1:-1, None]
     change = (spacings[1] - spacings[0])[1:-1, None]
-    part = low + change * (np.arange(1, nj) / nj)
-    first = out[:, :1, 1:-1]
-    last = out[:, -1:, 1:-1]
-    out[:, 1:-1, 1:-1] = first + part * (last - first)
+    position = low_spacing + change * (np.arange(1, nj) / nj)
+    near_side = out[:, :1, 1:-1]
+    far_side = out[:, -1:, 1:-1]
+    out[:, 1:-1, 1:-1] = near_side + position * (far_side - near_side)
 
 
 def quasi_1d_grid(boundary: np.ndarray, family: str = "i") -> np.ndarray:
@@ -403,20 +403,20 @@ class AlgebraicRegridder:
         """
         previous, boundary = check_grids(previous, boundary)
         nodes = self.make_nodes(previous, boundary)
-        old = compute_corner_areas(previous)
-        new = compute_corner_areas(nodes)
-        sign = 1.0 if old.sum() >= 0.0 else -1.0
-        forced = [corner for corner in BLOCK_CORNERS if not sign * new[corner] > 0.0]
-        for corner in forced:
-            old[corner] = new[corner] = sign
-        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
-        if len(bad) or not np.isfinite(nodes).all():
-            also = f"cells {name_cells(bad)} of the {self.start} grid are not convex"
+        old_areas = compute_corner_areas(previous)
+        new_areas = compute_corner_areas(nodes)
+        sign = 1.0 if old_areas.sum() >= 0.0 else -1.0
+        exempt = [corner for corner in BLOCK_CORNERS if not sign * new_areas[corner] > 0.0]
+        for corner in exempt:
+            old_areas[corner] = new_areas[corner] = sign
+        bad_cells = np.argwhere(~(sign * new_areas > 0.0).all(axis=0))
+        if len(bad_cells) or not np.isfinite(nodes).all():
+            also = f"cells {name_cells(bad_cells)} of the {self.start} grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
-        ratio = float((new / old).min())
+        ratio = float((new_areas / old_areas).min())
         return RegridResult(
             nodes,
-            RegridReport(least_corner_ratio=ratio, start=self.start, exempt_corners=len(forced)),
+            RegridReport(least_corner_ratio=ratio, start=self.start, exempt_corners=len(exempt)),
         )
 
 

@@ -52,9 +52,9 @@ class RunFailure(Exception):
         """Where it happened; None where it has no place."""
         return self._place
 
-    def tell(self, words: str, kind: type[RunFailure] | None = None) -> RunFailure:
+    def tell(self, message: str, kind: type[RunFailure] | None = None) -> RunFailure:
         """A failure with other words, of the same cause, at the same place; of `kind`, if given."""
-        repeated = (kind or type(self))(words)
+        repeated = (kind or type(self))(message)
         repeated.cause = self.cause
         repeated._place = self.place
         return repeated

@@ -71,9 +71,9 @@ def read_source(name: str, block: str | None = None) -> np.ndarray | dict[str, n
     if ending in (".vts", ".vtk"):
         return read_structured(path)
     if ending == ".npz":
-        return _understand(_read_npz(path), str(path))
+        return _take_arrays(_read_npz(path), str(path))
     if ending in (".h5", ".hdf5"):
-        return _understand(*_read_hdf5(path, block))
+        return _take_arrays(*_read_hdf5(path, block))
     if ending in plot3d.ENDINGS:
         return _choose_block(plot3d.read_plot3d(path), path, block)
     if ending in UNORDERED:
@@ -84,33 +84,36 @@ def read_source(name: str, block: str | None = None) -> np.ndarray | dict[str, n
 
 def _choose_block(blocks: list[np.ndarray], path: Path, block: str | None) -> np.ndarray:
     """One block of a file whose blocks are numbered from 1."""
-    known = {str(number): nodes for number, nodes in enumerate(blocks, 1)}
-    if block is not None and block not in known:
-        raise BadInput(f"{path} has no block '{block}' with a grid; {_say_sizes(known)}")
-    if block is None and len(known) > 1:
-        raise BadInput(f"{path} has several blocks; choose one with --block: {_say_sizes(known)}")
+    named_blocks = {str(number): nodes for number, nodes in enumerate(blocks, 1)}
+    if block is not None and block not in named_blocks:
+        raise BadInput(f"{path} has no block '{block}' with a grid; {_say_sizes(named_blocks)}")
+    if block is None and len(named_blocks) > 1:
+        sizes = _say_sizes(named_blocks)
+        raise BadInput(f"{path} has several blocks; choose one with --block: {sizes}")
     chosen = block or "1"
-    return check_nodes(known[chosen], f"{path}, block '{chosen}'")
+    return check_nodes(named_blocks[chosen], f"{path}, block '{chosen}'")
 
 
-def _say_sizes(known: Mapping[str, np.ndarray]) -> str:
+def _say_sizes(named_blocks: Mapping[str, np.ndarray]) -> str:
+    """Names and numbers of cells of the blocks that there are, for a message."""
     return "there are: " + ", ".join(
         f"'{name}' ({' x '.join(str(n - 1) for n in nodes.shape[1:])} cells)"
-        for name, nodes in known.items()
+        for name, nodes in named_blocks.items()
     )
 
 
 def read_grid(name: str, block: str | None = None) -> np.ndarray:
     """The nodes in a file; BadInput where there are only curves."""
-    found = read_source(name, block)
-    if isinstance(found, dict):
+    source = read_source(name, block)
+    if isinstance(source, dict):
         raise BadInput(
             f"{name} holds boundary curves and no grid; make one first: shockgrid grid make {name}"
         )
-    return found
+    return source
 
 
 def _read_npz(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of an npz file by name; BadInput where it is none, or they are no numbers."""
     if not zipfile.is_zipfile(path):
         raise BadInput(f"{path} is not a readable npz file (it is not an archive of arrays)")
     try:
@@ -141,55 +144,60 @@ def _read_hdf5(path: Path, block: str | None) -> tuple[dict[str, np.ndarray], st
     try:
         with open_hdf5(path) as file:
             file.visititems(take)
-            known = {name: arrays for name, arrays in groups.items() if _kind_of(arrays)}
-            if block is not None and block not in known:
-                raise BadInput(f"{path} has no block '{block}' with a grid; {_say(known)}")
-            if block is None and len(known) > 1:
-                raise BadInput(f"{path} has several blocks; choose one with --block: {_say(known)}")
-            if not known:
+            usable_groups = {name: arrays for name, arrays in groups.items() if _find_kind(arrays)}
+            if block is not None and block not in usable_groups:
+                there_are = _list_names(usable_groups)
+                raise BadInput(f"{path} has no block '{block}' with a grid; {there_are}")
+            if block is None and len(usable_groups) > 1:
+                there_are = _list_names(usable_groups)
+                raise BadInput(f"{path} has several blocks; choose one with --block: {there_are}")
+            if not usable_groups:
                 names = sorted({name for arrays in groups.values() for name in arrays})
                 raise BadInput(_missing(str(path), names))
-            chosen = block if block is not None else next(iter(known))
-            arrays = {name: np.asarray(item[()]) for name, item in known[chosen].items()}
+            chosen = block if block is not None else next(iter(usable_groups))
+            arrays = {name: np.asarray(item[()]) for name, item in usable_groups[chosen].items()}
     except OSError as error:
         raise BadInput(f"{path} is not a readable HDF5 file ({error})") from None
     return arrays, f"{path}, block '{chosen}'" if chosen else str(path)
 
 
-def _say(known: Mapping) -> str:
-    return "there are: " + (", ".join(f"'{name}'" for name in known) or "none")
+def _list_names(names: Mapping) -> str:
+    """The names that there are, for a message."""
+    return "there are: " + (", ".join(f"'{name}'" for name in names) or "none")
 
 
-def _kind_of(arrays: Mapping[str, object]) -> str:
+def _find_kind(arrays: Mapping[str, object]) -> str:
+    """Whether named arrays are a "grid", "curves", or "" for neither."""
     if "nodes" in arrays or {"x", "y"} <= set(arrays):
         return "grid"
     return "curves" if set(SIDE_NAMES) <= {ALIASES.get(name, name) for name in arrays} else ""
 
 
 def _missing(where: str, names) -> str:
-    have = ", ".join(names) or "nothing"
+    """What a file lacks to be a grid or curves, for a message."""
+    present = ", ".join(names) or "nothing"
     sides = {ALIASES.get(name, name) for name in names}
     lacking = [name for name in SIDE_NAMES if name not in sides]
     if len(lacking) < len(SIDE_NAMES):
         if any(name in ALIASES for name in names):
             lacking = [alias for alias, side in ALIASES.items() if side in lacking]
-        return f"{where}: no boundary curve {', '.join(lacking)}; it has {have}"
+        return f"{where}: no boundary curve {', '.join(lacking)}; it has {present}"
     return (
         f"{where}: no grid (arrays x and y, or nodes) and no boundary curves (arrays i_min, i_max, "
-        f"j_min, j_max, or left, right, bottom, top); it has {have}"
+        f"j_min, j_max, or left, right, bottom, top); it has {present}"
     )
 
 
-def _understand(arrays: dict[str, np.ndarray], where: str):
+def _take_arrays(arrays: dict[str, np.ndarray], where: str):
     """Nodes or curves from named arrays."""
-    kind = _kind_of(arrays)
+    kind = _find_kind(arrays)
     if kind == "grid":
         nodes = arrays.get("nodes")
         if nodes is None:
-            parts = [arrays[name] for name in "xyz" if name in arrays]
-            if len({np.shape(part) for part in parts}) > 1:
+            coordinates = [arrays[name] for name in "xyz" if name in arrays]
+            if len({np.shape(part) for part in coordinates}) > 1:
                 raise BadInput(f"{where}: x, y (and z) must have one shape")
-            nodes = np.array(parts[:2] if parts[0].ndim == 2 else parts)
+            nodes = np.array(coordinates[:2] if coordinates[0].ndim == 2 else coordinates)
         elif nodes.ndim > 2 and nodes.shape[0] not in (2, 3) and nodes.shape[-1] in (2, 3):
             nodes = np.moveaxis(nodes, -1, 0)
         return check_nodes(nodes, where)
@@ -210,9 +218,9 @@ def check_nodes(nodes: np.ndarray, where: str) -> np.ndarray:
             f"{where}: nodes must have shape (2, ni+1, nj+1) or (3, ni+1, nj+1, nk+1), at least "
             f"2 cells each way; got {nodes.shape}"
         )
-    broken = np.argwhere(~np.isfinite(nodes).all(axis=0))
-    if broken.size:
-        node = ", ".join(map(str, broken[0]))
+    not_finite = np.argwhere(~np.isfinite(nodes).all(axis=0))
+    if not_finite.size:
+        node = ", ".join(map(str, not_finite[0]))
         raise BadInput(f"{where}: node ({node}) is not a finite number")
     extent = np.ptp(nodes.reshape(nodes.shape[0], -1), axis=1)
     for name, size in zip("xyz", extent, strict=False):
@@ -235,10 +243,10 @@ def make_polyline(values: np.ndarray, side: str, where: str) -> np.ndarray:
         )
     if not np.isfinite(line).all():
         raise BadInput(f"{where}: curve {side} has a point that is not a finite number")
-    keep = np.concatenate([[True], np.hypot(*np.diff(line, axis=1)) > 0.0])
-    if keep.sum() < 2:
+    is_new_point = np.concatenate([[True], np.hypot(*np.diff(line, axis=1)) > 0.0])
+    if is_new_point.sum() < 2:
         raise BadInput(f"{where}: curve {side} is a single point; a side needs a length")
-    return np.ascontiguousarray(line[:, keep])
+    return np.ascontiguousarray(line[:, is_new_point])
 
 
 def orient_sides(
@@ -251,7 +259,7 @@ def orient_sides(
     Raises BadInput naming the two sides, by their `names` in the file, whose ends do not meet.
     """
     size = max(np.ptp(np.concatenate(list(sides.values()), axis=1), axis=1))
-    ways = []
+    candidates = []
     for flips in np.ndindex(2, 2, 2, 2):
         turned = {
             side: line[:, ::-1] if flip else line
@@ -261,11 +269,15 @@ def orient_sides(
             (float(np.hypot(*(turned[a][:, p] - turned[b][:, q]))), (a, b, turned[a][:, p]))
             for a, p, b, q in CORNERS
         ]
-        total = sum(gap for gap, _ in gaps)
-        ways.append((total, _round_area(turned, size), turned, max(gaps, key=lambda pair: pair[0])))
-    least = min(total for total, *_ in ways)
-    ways = [way for way in ways if way[0] <= least + SAME_GAP * size]
-    _, _, turned, (gap, (first, second, point)) = min(ways, key=lambda way: way[1])
+        total_gap = sum(gap for gap, _ in gaps)
+        candidates.append(
+            (total_gap, _round_area(turned, size), turned, max(gaps, key=lambda pair: pair[0]))
+        )
+    least = min(total_gap for total_gap, *_ in candidates)
+    candidates = [candidate for candidate in candidates if candidate[0] <= least + SAME_GAP * size]
+    _, _, turned, (gap, (first, second, point)) = min(
+        candidates, key=lambda candidate: candidate[1]
+    )
     if gap > MOST_CORNER_GAP * size:
         x, y = point
         raise BadInput(
@@ -321,14 +333,14 @@ def make_boundary(
 
 def read_sides(name: str, block: str | None, cells: tuple[int, int] | None) -> np.ndarray:
     """Boundary array (2, ni+1, nj+1) from curves, or from the sides of a plane grid, in a file."""
-    found = read_source(name, block)
-    if isinstance(found, dict):
-        return make_boundary(found, cells, name)
-    if found.shape[0] == 3:
+    source = read_source(name, block)
+    if isinstance(source, dict):
+        return make_boundary(source, cells, name)
+    if source.shape[0] == 3:
         raise BadInput(f"{name} is a grid in space; use shockgrid grid regrid {name}")
     if cells is None:
-        return take_sides(found)
-    sides = dict(zip(SIDE_NAMES, get_sides(found), strict=True))
+        return take_sides(source)
+    sides = dict(zip(SIDE_NAMES, get_sides(source), strict=True))
     return make_boundary(sides, cells, name)
 
 
@@ -349,9 +361,9 @@ def read_structured(path: Path) -> np.ndarray:
     """
     # legacy text or XML, by its first bytes
     with path.open("rb") as file:
-        head = file.read(64).lstrip()
-    legacy = head.startswith(b"# vtk DataFile")
-    if not legacy and head[:1] != b"<":
+        first_bytes = file.read(64).lstrip()
+    legacy = first_bytes.startswith(b"# vtk DataFile")
+    if not legacy and first_bytes[:1] != b"<":
         raise BadInput(f"{path} is not a VTK file")
     try:
         from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -380,18 +392,18 @@ def read_structured(path: Path) -> np.ndarray:
     grid = reader.GetOutput()
     extent = grid.GetExtent()
     counts = tuple(extent[2 * k + 1] - extent[2 * k] + 1 for k in range(3))
-    number = grid.GetNumberOfPoints()
-    if reader.GetErrorCode() or not number or number != np.prod(counts):
-        raise BadInput(f"{path}: its points cannot be read ({number} of a structured grid)")
+    point_count = grid.GetNumberOfPoints()
+    if reader.GetErrorCode() or not point_count or point_count != np.prod(counts):
+        raise BadInput(f"{path}: its points cannot be read ({point_count} of a structured grid)")
     # as arrays, plane where it is flat
     points = vtk_to_numpy(grid.GetPoints().GetData())
     nodes = np.array([points[:, k].reshape(counts, order="F") for k in range(3)], dtype=float)
     if counts[2] > 1:
         return nodes
-    flat = nodes[:, :, :, 0]
-    if np.ptp(flat[2]) > FLAT_GRID_HEIGHT * np.ptp(flat[:2]):
+    plane_nodes = nodes[:, :, :, 0]
+    if np.ptp(plane_nodes[2]) > FLAT_GRID_HEIGHT * np.ptp(plane_nodes[:2]):
         raise BadInput(f"{path}: a surface in space; a plane grid with z = const is wanted")
-    return np.ascontiguousarray(flat[:2])
+    return np.ascontiguousarray(plane_nodes[:2])
 
 
 def find_start(boundary: np.ndarray, cuts: Cuts = ()) -> tuple[np.ndarray, str]:

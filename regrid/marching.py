@@ -103,22 +103,22 @@ def march(
     times = [float(t) for t in times]
     if not np.isfinite(times).all():
         raise BadInput("march: times must be finite numbers")
-    more = () if sound_speed is None else (sound_speed,)
+    arguments = () if sound_speed is None else (sound_speed,)
     turned = compute_area(start) < 0.0
-    found = March(start.copy(), len(times))
+    progress = March(start.copy(), len(times))
     if keep_every:
-        found.kept.append(found.nodes)
-        found.kept_times.append(0.0)
+        progress.kept.append(progress.nodes)
+        progress.kept_times.append(0.0)
     # each is regridded from the last good grid
     for step, t in enumerate(times, start=1):
         boundary = boundary_at(t)
         begun = time.process_time()
         try:
-            result = call_regridder(regridder, found.nodes, boundary, *more)
+            result = call_regridder(regridder, progress.nodes, boundary, *arguments)
         except RegridFailure as failure:
-            found.failure = str(failure)
-            found.folded = failure.grid
-            found.error = failure
+            progress.failure = str(failure)
+            progress.folded = failure.grid
+            progress.error = failure
             break
         seconds = time.process_time() - begun
         # convex, whichever way round it is
@@ -126,25 +126,27 @@ def march(
         quality = measure_quality(upright)
         if quality.bad_cells:
             named = name_cells(find_bad_cells(upright), 8)
-            found.failure = f"{say_not_convex(quality.bad_cells)}: {named}"
-            found.folded = result.nodes
+            progress.failure = f"{say_not_convex(quality.bad_cells)}: {named}"
+            progress.folded = result.nodes
             break
         # what is known of the march so far
-        found.nodes = result.nodes
-        found.done = step
-        found.times.append(t)
-        found.seconds.append(seconds)
-        found.reports.append(result.report)
-        found.sub_moves += result.report.sub_moves
-        found.rescues += result.report.rescues
+        progress.nodes = result.nodes
+        progress.done = step
+        progress.times.append(t)
+        progress.seconds.append(seconds)
+        progress.reports.append(result.report)
+        progress.sub_moves += result.report.sub_moves
+        progress.rescues += result.report.rescues
         if gap_sides:
-            found.gap = max(found.gap, *(measure_first_line_gap(found.nodes, s) for s in gap_sides))
-        found.sine = min(found.sine, quality.least_scaled_jacobian)
-        found.aspect = max(found.aspect, quality.worst_aspect_ratio)
+            progress.gap = max(
+                progress.gap, *(measure_first_line_gap(progress.nodes, s) for s in gap_sides)
+            )
+        progress.sine = min(progress.sine, quality.least_scaled_jacobian)
+        progress.aspect = max(progress.aspect, quality.worst_aspect_ratio)
         if keep_every and step % keep_every == 0:
-            found.kept.append(found.nodes)
-            found.kept_times.append(t)
-    return found
+            progress.kept.append(progress.nodes)
+            progress.kept_times.append(t)
+    return progress
 
 
 def march_domain(

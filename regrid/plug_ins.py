@@ -50,18 +50,18 @@ class PlugIn:
         from importlib.metadata import EntryPoint
 
         try:
-            found = EntryPoint(self.name, self.value, self.group).load()
+            loaded = EntryPoint(self.name, self.value, self.group).load()
         except Exception as error:  # whatever somebody else's module raises
             raise BadInput(
                 f"{GROUPS[self.group]} {self.name!r} of the package {self.origin} cannot be "
                 f"imported from {self.value} ({type(error).__name__}: {error})"
             ) from error
-        if not callable(found):
+        if not callable(loaded):
             raise BadInput(
                 f"{GROUPS[self.group]} {self.name!r} of the package {self.origin}: {self.value} is "
-                f"neither a class nor a function, but of type {type(found).__name__}"
+                f"neither a class nor a function, but of type {type(loaded).__name__}"
             )
-        return found
+        return loaded
 
 
 @functools.cache
@@ -72,19 +72,19 @@ def find_plug_ins(group: str) -> tuple[PlugIn, ...]:
     """
     from importlib.metadata import distributions
 
-    found = []
+    entries = []
     seen = set()
     for distribution in distributions():
         name = str(distribution.metadata["Name"])
         if name in seen:
             continue
         seen.add(name)
-        found += [
+        entries += [
             PlugIn(group, entry.name, entry.value, name, str(distribution.version))
             for entry in distribution.entry_points
             if entry.group == group
         ]
-    return tuple(sorted(found, key=lambda one: (one.name, one.distribution)))
+    return tuple(sorted(entries, key=lambda entry: (entry.name, entry.distribution)))
 
 
 class PlugIns(Mapping[str, Any]):
@@ -99,25 +99,25 @@ class PlugIns(Mapping[str, Any]):
 
     def find(self, name: str) -> PlugIn:
         """Where a name points to; KeyError without it, BadInput where two packages have it."""
-        found = [one for one in find_plug_ins(self.group) if one.name == name]
-        if not found:
+        entries = [entry for entry in find_plug_ins(self.group) if entry.name == name]
+        if not entries:
             raise KeyError(name)
-        if len(found) > 1:
-            origins = " and ".join(one.origin for one in found)
+        if len(entries) > 1:
+            origins = " and ".join(entry.origin for entry in entries)
             raise BadInput(
-                f"the {GROUPS[self.group]} {name!r} is in {len(found)} installed packages, "
+                f"the {GROUPS[self.group]} {name!r} is in {len(entries)} installed packages, "
                 f"{origins}; uninstall all but one"
             )
-        return found[0]
+        return entries[0]
 
     def __getitem__(self, name: str) -> Any:
         return self.find(name).load()
 
     def __contains__(self, name: object) -> bool:
-        return any(one.name == name for one in find_plug_ins(self.group))
+        return any(entry.name == name for entry in find_plug_ins(self.group))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(one.name for one in find_plug_ins(self.group)))
+        return iter(dict.fromkeys(entry.name for entry in find_plug_ins(self.group)))
 
     def __len__(self) -> int:
         return len(list(iter(self)))

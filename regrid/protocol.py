@@ -129,11 +129,11 @@ def find_flow_aware(regridder: Regridder) -> FlowAwareRegridder | None:
     return regridder if regridder.sees_flow or regridder.owns_sides else None
 
 
-def check_regridder(regridder: object, given: str) -> None:
-    """Raise BadInput for what has no method `regrid`; `given`: how the caller came by it."""
+def check_regridder(regridder: object, origin: str) -> None:
+    """Raise BadInput for what has no method `regrid`; `origin`: how the caller came by it."""
     if isinstance(regridder, type) or not callable(getattr(regridder, "regrid", None)):
         raise BadInput(
-            f"{given} is {regridder!r}: a regridder is wanted, an object with a method "
+            f"{origin} is {regridder!r}: a regridder is wanted, an object with a method "
             "regrid(previous, boundary)"
         )
 
@@ -142,7 +142,7 @@ def call_regridder(
     regridder: Regridder,
     previous: np.ndarray,
     boundary: np.ndarray,
-    *more: Any,
+    *arguments: Any,
     where: str = "",
     in_place: bool = False,
 ) -> RegridResult:
@@ -155,9 +155,9 @@ def call_regridder(
     """
     # trusted: tests hold such regridders to it
     if in_place and hasattr(regridder, "works_in_place"):
-        return regridder.regrid(previous, boundary, *more, in_place=True)  # type: ignore[call-arg]
-    given = np.concatenate(get_sides(boundary), axis=1)
-    result = regridder.regrid(previous, boundary, *more)
+        return regridder.regrid(previous, boundary, *arguments, in_place=True)  # type: ignore[call-arg]
+    wanted_sides = np.concatenate(get_sides(boundary), axis=1)
+    result = regridder.regrid(previous, boundary, *arguments)
     name = f"regridder {type(regridder).__name__}"
     place = f"{name}: {where}" if where else name
     # what it returned is a grid of that shape
@@ -169,7 +169,7 @@ def call_regridder(
         )
     if nodes.shape != previous.shape:
         raise BadInput(f"{place}: it returned nodes {nodes.shape}; the grid has {previous.shape}")
-    if (np.concatenate(get_sides(nodes), axis=1) == given).all():
+    if (np.concatenate(get_sides(nodes), axis=1) == wanted_sides).all():
         return result
     # with the given sides, but for those that it places itself
     free: tuple[str, ...] = ()
@@ -177,16 +177,18 @@ def call_regridder(
         free = regridder.free_sides
     sides = get_sides(nodes)
     ends = np.cumsum([side.shape[1] for side in sides])[:-1]
-    away = {
+    distances = {
         side: float(np.hypot(*(line - wanted)).max())
-        for side, line, wanted in zip(SIDE_NAMES, sides, np.split(given, ends, 1), strict=True)
+        for side, line, wanted in zip(
+            SIDE_NAMES, sides, np.split(wanted_sides, ends, 1), strict=True
+        )
         if side not in free and not np.array_equal(line, wanted)
     }
-    if away:
-        side = max(away, key=away.__getitem__)
+    if distances:
+        side = max(distances, key=distances.__getitem__)
         raise BadInput(
             f"{place}{',' if where else ':'} side {side}: it returned other nodes than it was "
-            f"given, up to {away[side]:.3g} m away; a regridder must return the nodes of the "
+            f"given, up to {distances[side]:.3g} m away; a regridder must return the nodes of the "
             "sides unchanged, bitwise"
         )
     return result

@@ -43,10 +43,10 @@ def load_regridder(name: str) -> type[Regridder]:
     """The class behind a name; raises BadInput with the nearest name, or where an import fails."""
     if name not in REGRIDDERS:
         raise BadInput(f"regridder: there is none called '{name}'{suggest(name, REGRIDDERS)}")
-    found = REGRIDDERS[name]
-    if not isinstance(found, str):
-        return found
-    module, _, attribute = found.partition(":")
+    entry = REGRIDDERS[name]
+    if not isinstance(entry, str):
+        return entry
+    module, _, attribute = entry.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
@@ -88,13 +88,13 @@ def find_options(maker: Any) -> dict[str, str]:
 
     Options that the class takes together, as `**numbers`, are listed in its attribute `numbers`.
     """
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for name, parameter in inspect.signature(maker).parameters.items():
         if parameter.kind is inspect.Parameter.VAR_KEYWORD:
-            found |= maker.numbers
+            options |= maker.numbers
         else:
-            found[name] = str(parameter.annotation)
-    return found
+            options[name] = str(parameter.annotation)
+    return options
 
 
 def takes_weight(name: str) -> bool:

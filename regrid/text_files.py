@@ -76,8 +76,8 @@ def check_regular(path: str | Path) -> None:
 
     Pipes that a shell has put in a file's place pass.
     """
-    known = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
-    if not known and not str(path).startswith(PIPES):
+    words = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
+    if not words and not str(path).startswith(PIPES):
         raise BadInput(f"{path} is not a file but a device, a pipe or a socket")
 
 
@@ -104,12 +104,12 @@ def check_plain(value: Any) -> None:
     level = [value]
     for _ in range(DEEPEST_NESTING):
         inner: list[Any] = []
-        for one in level:
-            if isinstance(one, Mapping):
-                inner += one.values()
-            elif isinstance(one, list | tuple):
-                inner += one
-            elif isinstance(one, int) and one.bit_length() > MOST_BITS:
+        for word in level:
+            if isinstance(word, Mapping):
+                inner += word.values()
+            elif isinstance(word, list | tuple):
+                inner += word
+            elif isinstance(word, int) and word.bit_length() > MOST_BITS:
                 raise TooMuch(_TOO_LONG)
         if not inner:
             return

@@ -257,36 +257,37 @@ def find_valid_start(
     of every corner's area.  Raises RegridFailure where no valid grid is found.
     """
     # the grid moved with its sides
-    old = compute_corner_areas(previous)
-    sign = 1.0 if old.sum() >= 0.0 else -1.0
+    old_areas = compute_corner_areas(previous)
+    sign = 1.0 if old_areas.sum() >= 0.0 else -1.0
     nodes = displaced_grid(previous, boundary)
-    new = compute_corner_areas(nodes)
-    excluded = np.zeros(new.shape, dtype=bool)
+    new_areas = compute_corner_areas(nodes)
+    excluded = np.zeros(new_areas.shape, dtype=bool)
     # corners that sides make flat, and the block's own, do not count
-    if not ((sign * old > 0.0).all() and (sign * new > 0.0).all()):
+    if not ((sign * old_areas > 0.0).all() and (sign * new_areas > 0.0).all()):
         excluded = find_excluded_corners(boundary)
     collapsed = is_collapsed(excluded)
     count = int(excluded.sum())
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
-    old[excluded] = new[excluded] = sign
+    old_areas[excluded] = new_areas[excluded] = sign
     # it is taken where every corner keeps enough
-    valid = (sign * old > 0.0).all() and (sign * new > ratio * sign * old).all()
+    valid = (sign * old_areas > 0.0).all() and (sign * new_areas > ratio * sign * old_areas).all()
     if valid and sign * compute_area(boundary) > 0.0:
-        least = float((new / old).min())
+        least = float((new_areas / old_areas).min())
         report = RegridReport(0, 0, 0, 0, least, 0.0, "displacement", count)
         return ValidStart(nodes, report, excluded, collapsed)
     if collapsed:
-        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
+        bad_cells = np.argwhere(~(sign * new_areas > 0.0).all(axis=0))
+        here = f"; here cells {name_cells(bad_cells)} do" if len(bad_cells) else ""
         raise RegridFailure(
             "a side has nodes in one point; such a block can be moved only so far at once "
-            f"as no cell folds{f'; here cells {name_cells(bad)} do' if len(bad) else ''}"
+            f"as no cell folds{here}"
         )
-    found = barrier.regrid(previous, boundary)
+    result = barrier.regrid(previous, boundary)
     excluded = find_excluded_corners(boundary)
     for corner in BLOCK_CORNERS:
         excluded[corner] = True
-    return ValidStart(found.nodes, found.report, excluded, False)
+    return ValidStart(result.nodes, result.report, excluded, False)
 
 
 def measure_least_ratio(old: np.ndarray, new: np.ndarray, excluded: np.ndarray) -> float:
@@ -366,7 +367,7 @@ class VariationalRegridder(WeightedRegridder):
         """
         previous, boundary = check_grids(previous, boundary)
         # sides and a valid start
-        given = boundary
+        given_boundary = boundary
         boundary = self.distribute_sides(previous, boundary)
         start = find_valid_start(previous, boundary, self.barrier)
         # turned so that areas are positive, then minimised
@@ -376,18 +377,18 @@ class VariationalRegridder(WeightedRegridder):
         flip = slice(None, None, -1) if mirrored else slice(None)
         work.base[:] = start.nodes[flip]
         copy_sides(boundary[flip], work.sides)
-        weigh = self.weight.on(previous, given)
-        done = 0
+        weigh = self.weight.on(previous, given_boundary)
+        iterations = 0
         residual = 0.0
         limited = 0
         if min(ni, nj) > 1:
-            done, residual, limited = self._minimise(work, weigh, start)
+            iterations, residual, limited = self._minimise(work, weigh, start)
         # turned back
         nodes = np.array(work.base[flip])
         report = replace(
             start.report,
-            iterations=start.report.iterations + done,
-            node_iterations=start.report.node_iterations + done * (ni - 1) * (nj - 1),
+            iterations=start.report.iterations + iterations,
+            node_iterations=start.report.node_iterations + iterations * (ni - 1) * (nj - 1),
             least_corner_ratio=measure_least_ratio(previous, nodes, start.excluded),
             residual=residual,
             limited_nodes=limited,
@@ -410,15 +411,15 @@ class VariationalRegridder(WeightedRegridder):
         flip = slice(None, None, -1) if compute_area(start.nodes) < 0.0 else slice(None)
         work.begin(self.conditional, 0.0, 0.0, Tuning(epsilon=1.0, area_weight=0.0))
         functional = VariationalFunctional(self, work, start)
-        done = 0
+        iterations = 0
         step = np.inf
         damping = 1.0
-        fixed = None
+        cell_weight = None
         for _ in range(self.steps):
-            if fixed is None or not self.weight.is_frozen:
-                fixed = weigh(np.ascontiguousarray(work.base[flip]))
-            functional.set_weight(fixed)
-            done += functional.solve()
+            if cell_weight is None or not self.weight.is_frozen:
+                cell_weight = weigh(np.ascontiguousarray(work.base[flip]))
+            functional.set_weight(cell_weight)
+            iterations += functional.solve()
             last = step
             step = _measure_steps(work.base, work.change)
             if step <= self.tolerance:
@@ -428,7 +429,7 @@ class VariationalRegridder(WeightedRegridder):
                 damping = max(0.5 * damping, 0.1)  # the weight moves with the grid
             if not functional.descend(damping * self.fraction):
                 break
-        return done, step, functional.limited
+        return iterations, step, functional.limited
 
 
 class IvanenkoCharakhchyanRegridder(VariationalRegridder):
@@ -522,11 +523,13 @@ class VariationalFunctional:
 
 def _measure_steps(nodes: np.ndarray, change: np.ndarray) -> float:
     """The longest way of an inner node over the shortest of its four edges."""
-    along = (np.diff(nodes, axis=1) ** 2).sum(axis=0)[:, 1:-1]
-    across = (np.diff(nodes, axis=2) ** 2).sum(axis=0)[1:-1]
-    edges = np.minimum(np.minimum(along[1:], along[:-1]), np.minimum(across[:, 1:], across[:, :-1]))
-    ways = (change[:, 1:-1, 1:-1] ** 2).sum(axis=0)
-    return float(np.sqrt((ways / edges).max()))
+    squares_i = (np.diff(nodes, axis=1) ** 2).sum(axis=0)[:, 1:-1]
+    squares_j = (np.diff(nodes, axis=2) ** 2).sum(axis=0)[1:-1]
+    edges = np.minimum(
+        np.minimum(squares_i[1:], squares_i[:-1]), np.minimum(squares_j[:, 1:], squares_j[:, :-1])
+    )
+    motion_squares = (change[:, 1:-1, 1:-1] ** 2).sum(axis=0)
+    return float(np.sqrt((motion_squares / edges).max()))
 
 
 class NodeSpeedRegridder(VariationalRegridder):

@@ -37,8 +37,8 @@ def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
     """
     x, y = nodes[0], nodes[1]
     for i in range(residual.shape[1]):
-        size = 0.0
-        whole = 0.0
+        residual_squares = 0.0
+        term_squares = 0.0
         for j in range(residual.shape[2]):
             p = i + 1
             q = j + 1
@@ -67,10 +67,10 @@ def fill_equation(nodes, steps_i, steps_j, residual, scale_i, scale_j, sums):
             residual[0, i, j] = rx / a
             residual[1, i, j] = ry / a
             scale_i[i, j], scale_j[i, j] = scale / a, scale / c
-            size += rx * rx + ry * ry
-            whole += alpha * gamma * (alpha + gamma)
-        sums[0, i] = size
-        sums[1, i] = whole
+            residual_squares += rx * rx + ry * ry
+            term_squares += alpha * gamma * (alpha + gamma)
+        sums[0, i] = residual_squares
+        sums[1, i] = term_squares
 
 
 def compute_inverse_steps(sides: np.ndarray, control: str) -> tuple[np.ndarray, np.ndarray]:
@@ -83,8 +83,8 @@ def compute_inverse_steps(sides: np.ndarray, control: str) -> tuple[np.ndarray, 
             inverse.append(np.ones((n, m - 1)))
             continue
         low, high = (np.hypot(*np.diff(line, axis=1)) for line in (grid[:, :, 0], grid[:, :, -1]))
-        part = np.linspace(0.0, 1.0, m + 1)[1:-1]
-        steps = np.outer(low / low.sum(), 1.0 - part) + np.outer(high / high.sum(), part)
+        place = np.linspace(0.0, 1.0, m + 1)[1:-1]
+        steps = np.outer(low / low.sum(), 1.0 - place) + np.outer(high / high.sum(), place)
         inverse.append(1.0 / (n * steps))
     return inverse[0], inverse[1]
 
@@ -112,24 +112,29 @@ class WinslowRegridder:
     def regrid(self, previous: np.ndarray, boundary: np.ndarray) -> RegridResult:
         """Grid on the sides of `boundary`; raises RegridFailure naming non-convex cells."""
         previous, boundary = check_grids(previous, boundary)
-        old = compute_corner_areas(previous)
-        sign = 1.0 if old.sum() >= 0.0 else -1.0
+        old_areas = compute_corner_areas(previous)
+        sign = 1.0 if old_areas.sum() >= 0.0 else -1.0
         nodes, start = begin_grid(previous, boundary, sign)
-        done = 0
+        iterations_done = 0
         residual = 0.0
         if min(nodes.shape[1:]) > 2:
             unit = find_unit(nodes)
             nodes /= unit
-            done, residual = iterate_winslow(nodes, self.control, self.iterations, self.tolerance)
+            iterations_done, residual = iterate_winslow(
+                nodes, self.control, self.iterations, self.tolerance
+            )
             nodes *= unit
-        new = compute_corner_areas(nodes)
-        bad = np.argwhere(~(sign * new > 0.0).all(axis=0))
-        if len(bad) or not np.isfinite(nodes).all():
-            also = f"cells {name_cells(bad)} of the winslow grid are not convex"
+        new_areas = compute_corner_areas(nodes)
+        bad_cells = np.argwhere(~(sign * new_areas > 0.0).all(axis=0))
+        if len(bad_cells) or not np.isfinite(nodes).all():
+            also = f"cells {name_cells(bad_cells)} of the winslow grid are not convex"
             raise explain_failure(boundary, nodes[:: int(sign)], also=also, grid=nodes)
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
-        ratio = float((new / old).min())
-        return RegridResult(nodes, RegridReport(done, done * inner, 0, 0, ratio, residual, start))
+        ratio = float((new_areas / old_areas).min())
+        return RegridResult(
+            nodes,
+            RegridReport(iterations_done, iterations_done * inner, 0, 0, ratio, residual, start),
+        )
 
 
 def iterate_winslow(
@@ -146,8 +151,8 @@ def iterate_winslow(
     taus = make_cycle((min(n, m) / np.pi) ** 2)
     for iteration in range(iterations + 1):
         fill_equation(nodes, steps_i, across, residual, scale_i, scale_j, sums)
-        size, whole = sums.sum(axis=1)
-        error = float(np.sqrt(size / whole)) if whole > 0.0 else np.inf
+        size, term_squares = sums.sum(axis=1)
+        error = float(np.sqrt(size / term_squares)) if term_squares > 0.0 else np.inf
         if error <= tolerance or iteration == iterations or not np.isfinite(error):
             break
         tau = float(taus[iteration % taus.size])

@@ -71,10 +71,10 @@ def fill_cell_fluxes(nodes, weight, out, products):
     x, y = nodes[0], nodes[1]
     for i in range(weight.shape[0]):
         for j in range(weight.shape[1]):
-            up_x, up_y = x[i + 1, j + 1] - x[i, j], y[i + 1, j + 1] - y[i, j]
-            down_x, down_y = x[i + 1, j] - x[i, j + 1], y[i + 1, j] - y[i, j + 1]
-            d1x, d1y = 0.5 * (up_x + down_x), 0.5 * (up_y + down_y)
-            d2x, d2y = 0.5 * (up_x - down_x), 0.5 * (up_y - down_y)
+            rising_x, rising_y = x[i + 1, j + 1] - x[i, j], y[i + 1, j + 1] - y[i, j]
+            falling_x, falling_y = x[i + 1, j] - x[i, j + 1], y[i + 1, j] - y[i, j + 1]
+            d1x, d1y = 0.5 * (rising_x + falling_x), 0.5 * (rising_y + falling_y)
+            d2x, d2y = 0.5 * (rising_x - falling_x), 0.5 * (rising_y - falling_y)
             a = weight[i, j] * (d2x * d2x + d2y * d2y)
             b = weight[i, j] * (d1x * d1x + d1y * d1y)
             out[A, i, j] = a
@@ -122,13 +122,13 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
                 residual[k, i, j] = 0.5 * (along + across)
         # squares of the row, for the relative residual
         size = 0.0
-        whole = 0.0
+        flux_squares = 0.0
         for j in range(nj - 1):
             size += residual[0, i, j] ** 2 + residual[1, i, j] ** 2
-            whole += flux[AX, i, j] ** 2 + flux[AY, i, j] ** 2
-            whole += flux[BX, i, j] ** 2 + flux[BY, i, j] ** 2
+            flux_squares += flux[AX, i, j] ** 2 + flux[AY, i, j] ** 2
+            flux_squares += flux[BX, i, j] ** 2 + flux[BY, i, j] ** 2
         sums[0, i] = size
-        sums[1, i] = whole
+        sums[1, i] = flux_squares
 
 
 @kernel
@@ -140,12 +140,12 @@ def solve_lines(scale, edge, tau, values, upper):
     n, m = scale.shape
     for k in range(n):
         for j in range(m):
-            before = tau * edge[k, j]
+            coupling = tau * edge[k, j]
             pivot = scale[k, j] + tau * (edge[k, j] + edge[k + 1, j])
             if k > 0:
-                pivot -= before * upper[k - 1, j]
-                values[0, k, j] += before * values[0, k - 1, j]
-                values[1, k, j] += before * values[1, k - 1, j]
+                pivot -= coupling * upper[k - 1, j]
+                values[0, k, j] += coupling * values[0, k - 1, j]
+                values[1, k, j] += coupling * values[1, k - 1, j]
             inverse = 1.0 / pivot
             upper[k, j] = tau * edge[k + 1, j] * inverse
             values[0, k, j] *= inverse
@@ -181,9 +181,9 @@ def iterate(
     Returns the accepted iterate of least residual; `best` is -1 if there was none.
     """
     best = -1
-    least = np.inf
+    least_residual = np.inf
     stop = "iterations"
-    kept = nodes.copy()
+    best_nodes = nodes.copy()
     residuals: list[float] = []
     spreads: list[float] = []
     for iteration in range(iterations + 1):
@@ -200,11 +200,11 @@ def iterate(
         mean = products.mean()
         spreads.append(float(products.std() / abs(mean)) if mean != 0.0 else np.inf)
         # the best valid iterate is kept
-        ended = iteration == iterations or residual <= tolerance
-        if residual < least and operator.is_good(nodes, iteration, ended):
+        is_last = iteration == iterations or residual <= tolerance
+        if residual < least_residual and operator.is_good(nodes, iteration, is_last):
             best = iteration
-            least = residual
-            kept[:] = nodes
+            least_residual = residual
+            best_nodes[:] = nodes
         # ended, or no better for a while
         if best == iteration and residual <= tolerance:
             stop = "converged"
@@ -214,7 +214,7 @@ def iterate(
             break
         if iteration < iterations:
             operator.correct(nodes, operator.choose_tau(iteration, residuals))
-    return Equidistributed(kept, stop, best, np.array(residuals), np.array(spreads))
+    return Equidistributed(best_nodes, stop, best, np.array(residuals), np.array(spreads))
 
 
 class Ed2Operator:
@@ -235,19 +235,21 @@ class Ed2Operator:
         self.coefficients = np.empty((3, ni, nj))
         self.sums = np.empty((2, ni - 1))
         self.worst = np.empty((4, ni))
-        self.bad = np.empty(ni, dtype=np.int64)
+        self.bad_cells = np.empty(ni, dtype=np.int64)
         self.rows = np.empty((4, nj))
         self.sign = 1.0
         self.least_sine = least_sine
-        self.backed_off = 1.0
+        self.tau_factor = 1.0
 
     def evaluate(self, nodes: np.ndarray, weight: np.ndarray) -> float:
+        """Evaluate the equations at `nodes`; returns the rms residual over the rms fluxes."""
         fill_cell_fluxes(nodes, weight, self.flux, self.products)
         fill_nodes_equation(self.flux, self.residual, self.coefficients, self.sums)
-        size, whole = self.sums.sum(axis=1)
-        return float(np.sqrt(size / whole)) if whole > 0.0 else np.inf
+        size, flux_squares = self.sums.sum(axis=1)
+        return float(np.sqrt(size / flux_squares)) if flux_squares > 0.0 else np.inf
 
     def is_good(self, nodes: np.ndarray, iteration: int, ended: bool) -> bool:
+        """Whether an iterate may be returned: convex, and not too sharp."""
         sine = self.measure_sine(nodes)
         if iteration == 0 and sine > 0.0:
             self.least_sine = min(self.least_sine, sine)
@@ -258,17 +260,17 @@ class Ed2Operator:
         if iteration == 0 or iteration % self.taus.size == 0:
             if iteration > 0:
                 worse = residuals[-1] > residuals[-1 - self.taus.size]
-                part = self.backed_off
-                self.backed_off = max(0.25 * part, 0.01) if worse else min(2.0 * part, 1.0)
+                factor = self.tau_factor
+                self.tau_factor = max(0.25 * factor, 0.01) if worse else min(2.0 * factor, 1.0)
             self.taus = choose_taus(self)
-        return max(self.backed_off * self.taus[iteration % self.taus.size], 0.25)
+        return max(self.tau_factor * self.taus[iteration % self.taus.size], 0.25)
 
     def measure_sine(self, nodes: np.ndarray) -> float:
         """Least corner sine; 0 unless every cell is convex and oriented like the start."""
         if self.sign < 0.0:
             nodes = np.ascontiguousarray(nodes[::-1])
-        measure_rows(nodes, self.rows, self.worst, self.bad)
-        return 0.0 if self.bad.any() else float(np.sqrt(self.worst[SINE].min()))
+        measure_rows(nodes, self.rows, self.worst, self.bad_cells)
+        return 0.0 if self.bad_cells.any() else float(np.sqrt(self.worst[SINE].min()))
 
     def correct(self, nodes: np.ndarray, tau: float) -> None:
         """One alternating-direction correction of the inner nodes, after `evaluate`."""
@@ -315,15 +317,15 @@ def iterate_ed2(
     if not np.isfinite(nodes).all():
         raise BadInput("equidistribution: the grid has nodes that are not finite numbers")
     operator = Ed2Operator((nodes.shape[1] - 1, nodes.shape[2] - 1), least_sine)
-    found = iterate(operator, nodes, weigh, iterations, tolerance)
-    if found.best < 0:
-        bad = find_bad_cells(nodes if operator.sign > 0.0 else nodes[::-1])
+    solution = iterate(operator, nodes, weigh, iterations, tolerance)
+    if solution.best < 0:
+        bad_cells = find_bad_cells(nodes if operator.sign > 0.0 else nodes[::-1])
         raise RegridFailure(
-            f"cells {name_cells(bad)} of the equidistributed grid are not convex after "
-            f"{found.residuals.size - 1} iterations",
+            f"cells {name_cells(bad_cells)} of the equidistributed grid are not convex after "
+            f"{solution.residuals.size - 1} iterations",
             grid=nodes,
         )
-    return found
+    return solution
 
 
 class EquidistributionRegridder(WeightedRegridder):
@@ -355,24 +357,24 @@ class EquidistributionRegridder(WeightedRegridder):
         previous, boundary = check_grids(previous, boundary)
         boundary = self.distribute_sides(previous, boundary)
         # a start on the new sides
-        old = compute_corner_areas(previous)
-        sign = 1.0 if old.sum() >= 0.0 else -1.0
+        old_areas = compute_corner_areas(previous)
+        sign = 1.0 if old_areas.sum() >= 0.0 else -1.0
         nodes, start = begin_grid(previous, boundary, sign)
         # equations in lengths of the grid
         unit = find_unit(nodes)
         try:
             if min(nodes.shape[1:]) < 3:  # no inner node
-                found = accept_sides(nodes, sign)
+                solution = accept_sides(nodes, sign)
             else:
                 weigh = self.weight.on(previous, boundary)
-                found = iterate_ed2(
+                solution = iterate_ed2(
                     nodes / unit,
                     lambda grid: weigh(grid * unit),
                     self.iterations,
                     self.tolerance,
                     least_sine=LEAST_SINE,
                 )
-                found = replace(found, nodes=found.nodes * unit)
+                solution = replace(solution, nodes=solution.nodes * unit)
         except RegridFailure as failure:
             grid = None if failure.grid is None else failure.grid * unit
             raise explain_failure(
@@ -380,11 +382,11 @@ class EquidistributionRegridder(WeightedRegridder):
             ) from failure
         # what it took
         inner = (nodes.shape[1] - 2) * (nodes.shape[2] - 2)
-        done = found.residuals.size - 1
-        ratio = float((compute_corner_areas(found.nodes) / old).min())
-        residual = float(found.residuals[found.best])
-        report = RegridReport(done, done * inner, 0, 0, ratio, residual, start)
-        return RegridResult(found.nodes, report)
+        iterations = solution.residuals.size - 1
+        ratio = float((compute_corner_areas(solution.nodes) / old_areas).min())
+        residual = float(solution.residuals[solution.best])
+        report = RegridReport(iterations, iterations * inner, 0, 0, ratio, residual, start)
+        return RegridResult(solution.nodes, report)
 
 
 def accept_sides(nodes: np.ndarray, sign: float) -> Equidistributed:

@@ -92,19 +92,21 @@ def solve_edc(
 
 def compute_surface_areas(points: np.ndarray) -> np.ndarray:
     """Areas (ni, nj) of surface cells by their mid-lines; points (3, ni+1, nj+1)."""
-    up = points[:, 1:, 1:] - points[:, :-1, :-1]
-    down = points[:, 1:, :-1] - points[:, :-1, 1:]
-    along = 0.5 * (up + down)
-    across = 0.5 * (up - down)
-    normal = np.cross(along, across, axis=0)
+    rising_diagonal = points[:, 1:, 1:] - points[:, :-1, :-1]
+    falling_diagonal = points[:, 1:, :-1] - points[:, :-1, 1:]
+    mid_i = 0.5 * (rising_diagonal + falling_diagonal)
+    mid_j = 0.5 * (rising_diagonal - falling_diagonal)
+    normal = np.cross(mid_i, mid_j, axis=0)
     return np.sqrt((normal**2).sum(axis=0))
 
 
 def compute_parameter_areas(parameters: np.ndarray) -> np.ndarray:
     """Signed areas J~ (ni, nj) of the cells in the plane of the parameters (2, ni+1, nj+1)."""
-    up = parameters[:, 1:, 1:] - parameters[:, :-1, :-1]
-    down = parameters[:, 1:, :-1] - parameters[:, :-1, 1:]
-    return 0.5 * (up[1] * down[0] - up[0] * down[1])
+    rising_diagonal = parameters[:, 1:, 1:] - parameters[:, :-1, :-1]
+    falling_diagonal = parameters[:, 1:, :-1] - parameters[:, :-1, 1:]
+    return 0.5 * (
+        rising_diagonal[1] * falling_diagonal[0] - rising_diagonal[0] * falling_diagonal[1]
+    )
 
 
 def weigh_surface(surface, weight, parameters: np.ndarray) -> np.ndarray:
@@ -113,8 +115,10 @@ def weigh_surface(surface, weight, parameters: np.ndarray) -> np.ndarray:
     The weight is evaluated at the mean of a cell's four nodes in space.
     """
     points = surface(parameters)
-    flat = np.abs(compute_parameter_areas(parameters))
-    ratio = compute_surface_areas(points) / np.maximum(flat, 1e-12 * flat.mean())
+    parameter_areas = np.abs(compute_parameter_areas(parameters))
+    ratio = compute_surface_areas(points) / np.maximum(
+        parameter_areas, 1e-12 * parameter_areas.mean()
+    )
     # A collapsed cell on the surface still needs a positive coefficient.
     return weigh_points(weight, compute_centres(points)) * np.maximum(ratio, 1e-12 * ratio.mean())
 
@@ -153,21 +157,21 @@ EDGE_ROW = 4
 
 
 @inlined
-def difference_row(x, i, j, n, Z, at):
+def difference_row(x, i, j, n, Z, start):
     """Cell-centred differences of one coordinate along a row of cells (theory R10.5)."""
     r00 = x[i, j]
     r01 = x[i, j + 1]
     r10 = x[i + 1, j]
     r11 = x[i + 1, j + 1]
     for k in range(n):
-        low = r00[k] + r00[k + 1]
-        left = r01[k] + r01[k + 1]
-        right = r10[k] + r10[k + 1]
-        high = r11[k] + r11[k + 1]
-        Z[at + k] = 0.25 * ((high + right) - (left + low))
-        Z[at + 3 * VOLUME_SPAN + k] = 0.25 * ((high + left) - (right + low))
-        upper = (r00[k + 1] + r11[k + 1]) + (r01[k + 1] + r10[k + 1])
-        Z[at + 6 * VOLUME_SPAN + k] = 0.25 * (upper - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
+        sum_00 = r00[k] + r00[k + 1]
+        sum_01 = r01[k] + r01[k + 1]
+        sum_10 = r10[k] + r10[k + 1]
+        sum_11 = r11[k] + r11[k + 1]
+        Z[start + k] = 0.25 * ((sum_11 + sum_10) - (sum_01 + sum_00))
+        Z[start + 3 * VOLUME_SPAN + k] = 0.25 * ((sum_11 + sum_01) - (sum_10 + sum_00))
+        next_sum = (r00[k + 1] + r11[k + 1]) + (r01[k + 1] + r10[k + 1])
+        Z[start + 6 * VOLUME_SPAN + k] = 0.25 * (next_sum - ((r00[k] + r11[k]) + (r01[k] + r10[k])))
 
 
 @inlined
@@ -180,11 +184,11 @@ def weigh_row(weight, n, Z):
         g11 = dot(a, a)
         g22 = dot(b, b)
         g33 = dot(c, c)
-        w = weight[k]
-        Z[A + k] = w * (g22 * g33)
-        Z[A + VOLUME_SPAN + k] = w * (g11 * g33)
-        Z[A + 2 * VOLUME_SPAN + k] = w * (g11 * g22)
-        Z[WV + k] = w * dot(a, cross(b, c))
+        cell_weight = weight[k]
+        Z[A + k] = cell_weight * (g22 * g33)
+        Z[A + VOLUME_SPAN + k] = cell_weight * (g11 * g33)
+        Z[A + 2 * VOLUME_SPAN + k] = cell_weight * (g11 * g22)
+        Z[WV + k] = cell_weight * dot(a, cross(b, c))
 
 
 @inlined
@@ -208,30 +212,30 @@ def sum_row(n, Z):
 
 
 @inlined
-def give_row(to_lower, to_upper, lower, upper, n, Z, c):
+def scatter_row(adds_to_lower, stores_in_upper, lower, upper, n, Z, component):
     """Contribution of a row to the residual: added to the nodes below in i, stored at those above.
 
     c: VOLUME_SPAN times the index of the component.
     """
     for k in range(n - 1):
-        across = Z[K + 3 * VOLUME_SPAN + c + k] - Z[L + 3 * VOLUME_SPAN + c + k]
-        across += Z[K + 6 * VOLUME_SPAN + c + k] + Z[L + 6 * VOLUME_SPAN + c + k]
-        along = Z[K + c + k] + Z[L + c + k]
-        if to_lower:
+        across = Z[K + 3 * VOLUME_SPAN + component + k] - Z[L + 3 * VOLUME_SPAN + component + k]
+        across += Z[K + 6 * VOLUME_SPAN + component + k] + Z[L + 6 * VOLUME_SPAN + component + k]
+        along = Z[K + component + k] + Z[L + component + k]
+        if adds_to_lower:
             lower[k] += 0.25 * (across + along)
-        if to_upper:
+        if stores_in_upper:
             upper[k] = 0.25 * (across - along)
 
 
 @inlined
-def give_edges(to_lower, to_upper, lower, upper, n, Z, one, other):
+def scatter_edges(adds_to_lower, stores_in_upper, lower, upper, n, Z, first_row, second_row):
     """Add a quarter of two rows of coefficients to the edges of the planes below and above."""
     for k in range(n):
-        part = 0.25 * (Z[one + k] + Z[other + k])
-        if to_lower:
-            lower[k] += part
-        if to_upper:
-            upper[k] = part
+        quarter_sum = 0.25 * (Z[first_row + k] + Z[second_row + k])
+        if adds_to_lower:
+            lower[k] += quarter_sum
+        if stores_in_upper:
+            upper[k] = quarter_sum
 
 
 @kernel
@@ -245,61 +249,64 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
     e1, e2, e3 = edges
     n1, n2, n = weight.shape
     for i in range(first - 1, last):
-        to_lower, to_upper = i >= first, i + 1 < last
-        own = to_lower or first == 1
+        adds_to_lower, stores_in_upper = i >= first, i + 1 < last
+        is_own_row = adds_to_lower or first == 1
         low, high = max(i - 1, 0), min(i, n1 - 2)
         for j in range(n2):
             for c in range(3):
                 difference_row(nodes[c], i, j, n, Z, D + c * VOLUME_SPAN)
             weigh_row(weight[i, j], n, Z)
             sum_row(n, Z)
-            if own:
+            if is_own_row:
                 row = products[i, j]
                 for k in range(n):
                     row[k] = Z[WV + k]
             total = Z[KA + VOLUME_SPAN : KA + 2 * VOLUME_SPAN]
             for k in range(n - 1):
-                if to_lower:
+                if adds_to_lower:
                     e2[low, j, k] += 0.25 * total[k]
-                if to_upper:
+                if stores_in_upper:
                     e2[high, j, k] = 0.25 * total[k]
             if j > 0:
-                if own:
-                    give_edges(False, True, e1[i, j - 1], e1[i, j - 1], n - 1, Z, KA, LA)
+                if is_own_row:
+                    scatter_edges(False, True, e1[i, j - 1], e1[i, j - 1], n - 1, Z, KA, LA)
                 lower, upper = e3[low, j - 1], e3[high, j - 1]
-                give_edges(to_lower, to_upper, lower, upper, n, Z, A + 2 * VOLUME_SPAN, LC)
+                scatter_edges(
+                    adds_to_lower, stores_in_upper, lower, upper, n, Z, A + 2 * VOLUME_SPAN, LC
+                )
                 for c in range(3):
                     lower, upper = residual[c, low, j - 1], residual[c, high, j - 1]
-                    give_row(to_lower, to_upper, lower, upper, n, Z, c * VOLUME_SPAN)
+                    scatter_row(adds_to_lower, stores_in_upper, lower, upper, n, Z, c * VOLUME_SPAN)
             # this row's sums become those of the previous row
-            for at in range(0, L - K, VOLUME_SPAN):
+            for offset in range(0, L - K, VOLUME_SPAN):
                 for k in range(n):
-                    Z[L + at + k] = Z[K + at + k]
+                    Z[L + offset + k] = Z[K + offset + k]
             for k in range(n):
                 Z[LC + k] = Z[A + 2 * VOLUME_SPAN + k]
 
 
 @inlined
-def eliminate(lines, past, edges, own, factor, tau, link, kept):
-    """One elimination step along adjacent lines: (own + tau L) d = factor times `lines`.
+def eliminate(lines, lines_before, edges, scales, fixed_weight, tau, link, factors):
+    """One elimination step along adjacent lines: (scale + tau L) d = weight times `lines`.
 
-    `lines` and `past` are x, y, z of this node and of the previous one; `edges` its low and high
-    edge; `kept` the elimination factors of the previous node and of this one, which may share
-    memory with `own`; `link` is 0 at the first node, otherwise tau.
+    `lines` and `lines_before` are x, y, z of this node and of the previous one; `edges` its low and
+    high edge; `factors` the elimination factors of the previous node and of this one, which may
+    share memory with `scales`; the weight is `fixed_weight` or, where that is 0, the scale; `link`
+    is 0 at the first node, otherwise tau.
     """
-    low, high = edges
-    before, upper = kept
+    low_edge, high_edge = edges
+    factor_before, factor_here = factors
     x, y, z = lines
-    px, py, pz = past
-    for k in range(own.shape[0]):
-        scale = own[k]
-        back = link * low[k]
-        inverse = 1.0 / (scale + tau * (low[k] + high[k]) - back * before[k])
-        weight = factor if factor > 0.0 else scale
-        upper[k] = tau * high[k] * inverse
-        x[k] = (weight * x[k] + back * px[k]) * inverse
-        y[k] = (weight * y[k] + back * py[k]) * inverse
-        z[k] = (weight * z[k] + back * pz[k]) * inverse
+    x_before, y_before, z_before = lines_before
+    for k in range(scales.shape[0]):
+        scale = scales[k]
+        coupling = link * low_edge[k]
+        inverse = 1.0 / (scale + tau * (low_edge[k] + high_edge[k]) - coupling * factor_before[k])
+        weight = fixed_weight if fixed_weight > 0.0 else scale
+        factor_here[k] = tau * high_edge[k] * inverse
+        x[k] = (weight * x[k] + coupling * x_before[k]) * inverse
+        y[k] = (weight * y[k] + coupling * y_before[k]) * inverse
+        z[k] = (weight * z[k] + coupling * z_before[k]) * inverse
 
 
 @kernel
@@ -311,34 +318,51 @@ def sweep_first(residual, edges, tau, work, start, stop):
     """
     e1, e2, e3 = edges
     scale = work[0]
-    upper = work[1]
+    factor_rows = work[1]
     n = residual.shape[1]
     m = residual.shape[3]
     # forward along i: all lines of the planes together
     for i in range(n):
-        before = max(i - 1, 0)
+        i_before = max(i - 1, 0)
         link = tau if i > 0 else 0.0
         for j in range(start, stop):
-            a = e1[i, j]
-            b = e1[i + 1, j]
-            c = e2[i, j]
-            d = e2[i, j + 1]
-            e = e3[i, j]
-            own = scale[i, j]
+            edge_i = e1[i, j]
+            next_edge_i = e1[i + 1, j]
+            edge_j = e2[i, j]
+            next_edge_j = e2[i, j + 1]
+            edge_k = e3[i, j]
+            scale_row = scale[i, j]
             for k in range(m):
-                own[k] = ((a[k] + b[k]) + (c[k] + d[k]) + (e[k] + e[k + 1])) * (1.0 / 6.0)
+                scale_row[k] = (
+                    (edge_i[k] + next_edge_i[k])
+                    + (edge_j[k] + next_edge_j[k])
+                    + (edge_k[k] + edge_k[k + 1])
+                ) * (1.0 / 6.0)
             lines = residual[0, i, j], residual[1, i, j], residual[2, i, j]
-            past = residual[0, before, j], residual[1, before, j], residual[2, before, j]
-            eliminate(lines, past, (a, b), own, tau, tau, link, (upper[before, j], upper[i, j]))
+            lines_before = (
+                residual[0, i_before, j],
+                residual[1, i_before, j],
+                residual[2, i_before, j],
+            )
+            eliminate(
+                lines,
+                lines_before,
+                (edge_i, next_edge_i),
+                scale_row,
+                tau,
+                tau,
+                link,
+                (factor_rows[i_before, j], factor_rows[i, j]),
+            )
     # backward
     for i in range(n - 2, -1, -1):
         for j in range(start, stop):
-            for c in range(3):
-                row = residual[c, i, j]
-                after = residual[c, i + 1, j]
-                here = upper[i, j]
+            for edge_j in range(3):
+                row = residual[edge_j, i, j]
+                row_after = residual[edge_j, i + 1, j]
+                factors = factor_rows[i, j]
                 for k in range(m):
-                    row[k] += here[k] * after[k]
+                    row[k] += factors[k] * row_after[k]
 
 
 @kernel
@@ -350,54 +374,72 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
     e2 = edges[1][i]
     e3 = edges[2][i]
     scale = work[0, i]
-    upper = work[1, i]
+    factor_rows = work[1, i]
     x, y, z = residual[0, i], residual[1, i], residual[2, i]
     n = residual.shape[2]
     m = residual.shape[3]
     # along j: forward, then backward
     for j in range(n):
-        p = max(j - 1, 0)
+        before = max(j - 1, 0)
         link = tau if j > 0 else 0.0
         lines = (x[j], y[j], z[j])
-        past = (x[p], y[p], z[p])
-        eliminate(lines, past, (e2[j], e2[j + 1]), scale[j], 0.0, tau, link, (upper[p], upper[j]))
+        lines_before = (x[before], y[before], z[before])
+        eliminate(
+            lines,
+            lines_before,
+            (e2[j], e2[j + 1]),
+            scale[j],
+            0.0,
+            tau,
+            link,
+            (factor_rows[before], factor_rows[j]),
+        )
     for j in range(n - 2, -1, -1):
         for c in range(3):
             row = residual[c, i, j]
-            after = residual[c, i, j + 1]
-            here = upper[j]
+            row_after = residual[c, i, j + 1]
+            factors = factor_rows[j]
             for k in range(m):
-                row[k] += here[k] * after[k]
+                row[k] += factors[k] * row_after[k]
     # lines along k, transposed
     for j in range(n):
-        px = x[j]
-        py = y[j]
-        pz = z[j]
-        own = scale[j]
+        row_x = x[j]
+        row_y = y[j]
+        row_z = z[j]
+        scale_row = scale[j]
         edge = e3[j]
         for k in range(m):
-            turned[0, k, j] = px[k]
-            turned[1, k, j] = py[k]
-            turned[2, k, j] = pz[k]
-            turned[SCALE_ROW, k, j] = own[k]
+            turned[0, k, j] = row_x[k]
+            turned[1, k, j] = row_y[k]
+            turned[2, k, j] = row_z[k]
+            turned[SCALE_ROW, k, j] = scale_row[k]
             turned[EDGE_ROW, k, j] = edge[k]
         turned[EDGE_ROW, m, j] = edge[m]
     # solved: forward, then backward
     for k in range(m):
-        p = max(k - 1, 0)
+        before = max(k - 1, 0)
         link = tau if k > 0 else 0.0
         lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
-        past = (turned[0, p, :n], turned[1, p, :n], turned[2, p, :n])
-        own = turned[SCALE_ROW, k, :n]
+        lines_before = (turned[0, before, :n], turned[1, before, :n], turned[2, before, :n])
+        scale_row = turned[SCALE_ROW, k, :n]
         low, high = turned[EDGE_ROW, k, :n], turned[EDGE_ROW, k + 1, :n]
-        eliminate(lines, past, (low, high), own, 0.0, tau, link, (turned[SCALE_ROW, p, :n], own))
+        eliminate(
+            lines,
+            lines_before,
+            (low, high),
+            scale_row,
+            0.0,
+            tau,
+            link,
+            (turned[SCALE_ROW, before, :n], scale_row),
+        )
     for k in range(m - 2, -1, -1):
         for c in range(3):
             row = turned[c, k]
-            after = turned[c, k + 1]
-            here = turned[SCALE_ROW, k]
+            row_after = turned[c, k + 1]
+            factors = turned[SCALE_ROW, k]
             for j in range(n):
-                row[j] += here[j] * after[j]
+                row[j] += factors[j] * row_after[j]
     # added to the nodes
     for c in range(3):
         for j in range(n):
@@ -478,9 +520,11 @@ class Ed3Operator:
         return float(np.sqrt(size / count) / flux) if flux > 0.0 else np.inf
 
     def is_good(self, nodes: np.ndarray, iteration: int, ended: bool) -> bool:
+        """Whether an iterate may be returned; tested now and then, and at the end."""
         return (ended or iteration % ITERATIONS_PER_CHECK == 0) and is_valid(nodes, self.sign)
 
     def choose_tau(self, iteration: int, residuals: list[float]) -> float:
+        """A larger tau while the residual falls, half of it where that grew."""
         if iteration == 0:
             self.tau = FIRST_TAU
         else:
@@ -527,14 +571,14 @@ def solve_ed3(
             weigh_points(weight, compute_hexahedron_centres(grid)) if callable(weight) else values
         )
 
-    found = iterate(operator, nodes, weigh, iterations, tolerance)
-    if found.best < 0:
-        bad = find_bad_hexahedra(nodes if operator.sign > 0.0 else nodes[::-1])
+    solution = iterate(operator, nodes, weigh, iterations, tolerance)
+    if solution.best < 0:
+        bad_cells = find_bad_hexahedra(nodes if operator.sign > 0.0 else nodes[::-1])
         raise RegridFailure(
-            f"cells {name_cells(bad)} of the equidistributed volume have corners that are not "
-            f"positive after {found.residuals.size - 1} iterations"
+            f"cells {name_cells(bad_cells)} of the equidistributed volume have corners that are "
+            f"not positive after {solution.residuals.size - 1} iterations"
         )
-    return found
+    return solution
 
 
 def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
@@ -545,10 +589,10 @@ def is_valid(nodes: np.ndarray, sign: float = 1.0) -> bool:
 
 def interpolate_faces(nodes: np.ndarray) -> np.ndarray:
     """A copy of `nodes` (3, ...), its interior interpolated from the six faces (Boolean sum)."""
-    found = np.array(nodes, dtype=np.float64, order="C")
-    laws = [np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in found.shape[1:]]
-    fill_from_faces(found, laws)
-    return found
+    interpolated = np.array(nodes, dtype=np.float64, order="C")
+    spacings = [np.tile(np.linspace(0.0, 1.0, n), (2, 2, 1)) for n in interpolated.shape[1:]]
+    fill_from_faces(interpolated, spacings)
+    return interpolated
 
 
 def equidistribute_block(
@@ -614,25 +658,25 @@ def _place_face(mapping, weight, p, axis, end, iterations) -> Equidistributed:
         return mapping(points)
 
     start = interpolate_sides(face[free])
-    found = solve_eds(surface, start, weight, iterations)
-    face[free[0]], face[free[1]] = found.nodes
-    return found
+    solution = solve_eds(surface, start, weight, iterations)
+    face[free[0]], face[free[1]] = solution.nodes
+    return solution
 
 
 def interpolate_sides(parameters: np.ndarray) -> np.ndarray:
     """A copy of (2, ni+1, nj+1), its interior interpolated from the sides (Boolean sum)."""
-    found = np.array(parameters, dtype=np.float64, order="C")
-    u = np.linspace(0.0, 1.0, found.shape[1])[:, None]
-    v = np.linspace(0.0, 1.0, found.shape[2])
-    low = found[:, :1]
-    high = found[:, -1:]
-    left = found[:, :, :1]
-    right = found[:, :, -1:]
-    along = (1.0 - u) * low + u * high
-    across = (1.0 - v) * left + v * right
-    ends = (1.0 - v) * along[:, :, :1] + v * along[:, :, -1:]
-    found[:, 1:-1, 1:-1] = (along + across - ends)[:, 1:-1, 1:-1]
-    return found
+    interpolated = np.array(parameters, dtype=np.float64, order="C")
+    u = np.linspace(0.0, 1.0, interpolated.shape[1])[:, None]
+    v = np.linspace(0.0, 1.0, interpolated.shape[2])
+    low = interpolated[:, :1]
+    high = interpolated[:, -1:]
+    near = interpolated[:, :, :1]
+    far = interpolated[:, :, -1:]
+    between_i = (1.0 - u) * low + u * high
+    between_j = (1.0 - v) * near + v * far
+    ends = (1.0 - v) * between_i[:, :, :1] + v * between_i[:, :, -1:]
+    interpolated[:, 1:-1, 1:-1] = (between_i + between_j - ends)[:, 1:-1, 1:-1]
+    return interpolated
 
 
 class EquidistributionRegridder3D:
@@ -676,22 +720,26 @@ class EquidistributionRegridder3D:
         weight = self.weight
         if isinstance(weight, str):
             weight = compute_face_density(boundary if sign > 0.0 else boundary[::-1])
-        found = solve_ed3(nodes, weight, self.iterations, self.tolerance)
-        done = found.residuals.size - 1
-        residual = float(found.residuals[found.best])
-        return RegridResult(found.nodes, self._report(done, residual, previous, found.nodes, start))
+        solution = solve_ed3(nodes, weight, self.iterations, self.tolerance)
+        iterations = solution.residuals.size - 1
+        residual = float(solution.residuals[solution.best])
+        return RegridResult(
+            solution.nodes, self._report(iterations, residual, previous, solution.nodes, start)
+        )
 
     def _regrid_in(self, unit: float, previous, boundary) -> RegridResult:
         """`regrid` with lengths measured in `unit` [m]."""
         weight = self.weight
-        other = copy(self)
+        scaled_regridder = copy(self)
         if callable(weight):
-            other.weight = lambda *place: weight(*(unit * part for part in place))
-        result = other.regrid(previous / unit, boundary / unit)
+            scaled_regridder.weight = lambda *place: weight(
+                *(unit * coordinate for coordinate in place)
+            )
+        result = scaled_regridder.regrid(previous / unit, boundary / unit)
         return replace(result, nodes=result.nodes * unit)
 
     @staticmethod
-    def _report(done: int, residual: float, previous, nodes, start: str) -> RegridReport:
+    def _report(iterations: int, residual: float, previous, nodes, start: str) -> RegridReport:
         inner = int(np.prod([n - 2 for n in nodes.shape[1:]]))
         ratio = compute_corner_ratio(nodes, previous)
-        return RegridReport(done, done * inner, 0, 0, ratio, residual, start)
+        return RegridReport(iterations, iterations * inner, 0, 0, ratio, residual, start)

@@ -94,13 +94,15 @@ class Expression:
         self.has_gradient = False
         self._check(self.tree, 0)
 
-    def _fault(self, words: str) -> BadInput:
-        return BadInput(f"{self.what} '{self.text}': {words}")
+    def _fault(self, fault: str) -> BadInput:
+        """The exception for a formula, with what is wrong with it."""
+        return BadInput(f"{self.what} '{self.text}': {fault}")
 
     def _check(self, node: ast.expr, depth: int) -> None:
+        """Raise BadInput for a part of the formula that is not allowed; collect its names."""
         if depth > MOST_DEPTH:
             raise self._fault("it is nested too deeply")
-        below: list[ast.expr] = []
+        operands: list[ast.expr] = []
         # numbers and names
         if isinstance(node, ast.Constant):
             if isinstance(node.value, bool) or not isinstance(node.value, int | float):
@@ -117,21 +119,22 @@ class Expression:
             self.names.add(node.id)
         # operations, whose operands are checked below
         elif _is_over_max(node):
-            below = [node.left]
+            operands = [node.left]
         elif isinstance(node, ast.BinOp | ast.UnaryOp) and type(node.op) in OPERATORS:
-            below = [node.left, node.right] if isinstance(node, ast.BinOp) else [node.operand]
+            operands = [node.left, node.right] if isinstance(node, ast.BinOp) else [node.operand]
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
             raise self._fault("a power is written **, not ^")
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
             self._check_call(node)
-            below = list(node.args)
+            operands = list(node.args)
         else:
             raise self._fault("only + - * / **, brackets, |...|, numbers, names and functions work")
         # one level deeper
-        for child in below:
+        for child in operands:
             self._check(child, depth + 1)
 
     def _check_call(self, node: ast.Call) -> None:
+        """Raise BadInput for a function that is not there, or has another number of values."""
         name = node.func.id
         if name not in FUNCTIONS and name != GRADIENT:
             raise self._fault(
@@ -142,11 +145,12 @@ class Expression:
             raise self._fault(f"{name} takes {wanted} value{'s' * (wanted > 1)}")
         self.has_gradient |= name == GRADIENT
 
-    def check_names(self, known) -> None:
-        """Raise BadInput for a name that is neither in `known` nor a constant."""
+    def check_names(self, allowed_names) -> None:
+        """Raise BadInput for a name that is neither in `allowed_names` nor a constant."""
         for name in sorted(self.names):
-            if name not in known and name not in CONSTANTS:
-                raise self._fault(f"there is no '{name}' here{suggest(name, [*known, *CONSTANTS])}")
+            if name not in allowed_names and name not in CONSTANTS:
+                hint = suggest(name, [*allowed_names, *CONSTANTS])
+                raise self._fault(f"there is no '{name}' here{hint}")
 
     def evaluate(
         self,
@@ -162,15 +166,16 @@ class Expression:
             return np.asarray(self._evaluate(self.tree, values, gradient), dtype=np.float64)
 
     def _evaluate(self, node, values, gradient):
+        """The value of one part of the formula."""
         if isinstance(node, ast.Constant):
             return np.float64(node.value)
         if isinstance(node, ast.Name):
             return values[node.id] if node.id in values else CONSTANTS[node.id]
         if _is_over_max(node):
-            factor, rest = _split_number(node.left)
-            value = 1.0 if rest is None else self._evaluate(rest, values, gradient)
-            greatest = np.max(value)
-            return factor * (value / greatest if greatest != 0.0 else 0.0 * value)
+            factor, formula = _split_number(node.left)
+            value = 1.0 if formula is None else self._evaluate(formula, values, gradient)
+            maximum = np.max(value)
+            return factor * (value / maximum if maximum != 0.0 else 0.0 * value)
         if isinstance(node, ast.UnaryOp):
             return OPERATORS[type(node.op)](self._evaluate(node.operand, values, gradient))
         if isinstance(node, ast.BinOp):
@@ -217,6 +222,7 @@ def _spell_bars(text: str) -> str:
 
 
 def _is_over_max(node: ast.expr) -> bool:
+    """Whether it is something divided by `max`, its own maximum."""
     return (
         isinstance(node, ast.BinOp)
         and isinstance(node.op, ast.Div)
@@ -226,22 +232,22 @@ def _is_over_max(node: ast.expr) -> bool:
 
 
 def _split_number(node: ast.expr) -> tuple[float, ast.expr | None]:
-    """The leading number of a product or quotient (1 if none), and the rest of it."""
+    """The leading number of a product or quotient (1 if none), and what it multiplies."""
     if isinstance(node, ast.Constant):
         return float(node.value), None
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        factor, rest = _split_number(node.operand)
-        return -factor, rest
+        factor, formula = _split_number(node.operand)
+        return -factor, formula
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
-        factor, rest = _split_number(node.left)
-        other, following = _split_number(node.right)
+        factor, formula = _split_number(node.left)
+        second_factor, second_formula = _split_number(node.right)
         if isinstance(node.op, ast.Div):
-            if following is not None:
-                return factor, ast.BinOp(rest or ast.Constant(1.0), node.op, node.right)
-            return factor / other if other else np.inf, rest
-        if rest is None or following is None:
-            return factor * other, rest or following
-        return factor, ast.BinOp(rest, node.op, node.right)
+            if second_formula is not None:
+                return factor, ast.BinOp(formula or ast.Constant(1.0), node.op, node.right)
+            return factor / second_factor if second_factor else np.inf, formula
+        if formula is None or second_formula is None:
+            return factor * second_factor, formula or second_formula
+        return factor, ast.BinOp(formula, node.op, node.right)
     return 1.0, node
 
 
@@ -276,7 +282,7 @@ class Weight:
     """
 
     def __init__(self, weight, smoothing: int = 4):
-        self.given = weight
+        self.weight = weight
         self.smoothing = int(smoothing)
         if self.smoothing < 0:
             raise BadInput(f"weight: smoothing {smoothing} must not be negative")
@@ -286,28 +292,28 @@ class Weight:
         names = self.expression.names if self.expression else set()
         self.needs_fields = bool(names - {*GEOMETRY, "pi"})
         self.needs_sides = "sides" in names
-        self.needs_own = bool(names & {"own", "h"})
+        self.needs_old_cells = bool(names & {"own", "h"})
         self.fields: Mapping[str, np.ndarray] = {}
 
     @property
     def by_position(self) -> bool:
         """Whether it is a number or a function of x and y alone."""
         if self.expression is None:
-            return callable(self.given) or np.ndim(self.given) == 0
+            return callable(self.weight) or np.ndim(self.weight) == 0
         return self.expression.names <= {"x", "y", "pi"} and not self.expression.has_gradient
 
     @property
     def is_frozen(self) -> bool:
         """Whether it stays with the cells during the iteration."""
         if self.expression is None:
-            return not callable(self.given)
+            return not callable(self.weight)
         return not self.expression.names & {"x", "y"}
 
     def at_points(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values at points, for weights `by_position`."""
         if self.expression is not None:
             return weigh_points(self.expression.evaluate({"x": x, "y": y}), np.array([x, y]))
-        return weigh_points(self.given, np.array([x, y]))
+        return weigh_points(self.weight, np.array([x, y]))
 
     def take_fields(self, fields: Mapping[str, np.ndarray]) -> None:
         """Set the cell fields, (ni, nj) each, for the next grids."""
@@ -319,7 +325,7 @@ class Weight:
         Raises BadInput for unknown names and, when called, for values that are not positive.
         """
         if self.expression is None:
-            return lambda nodes: weigh_points(self.given, compute_centres(nodes))
+            return lambda nodes: weigh_points(self.weight, compute_centres(nodes))
         self._check_names()
         cells = (previous.shape[1] - 1, previous.shape[2] - 1)
         values = dict(self.fields)
@@ -329,23 +335,25 @@ class Weight:
                     f"weight: field '{name}' has shape {np.shape(field)}; the block has cells "
                     f"{cells}"
                 )
-        if self.needs_own:
+        if self.needs_old_cells:
             areas = np.abs(compute_corner_areas(previous)).sum(axis=0)
             areas = np.maximum(0.5 * areas, 1e-300)
             values |= {"own": areas.mean() / areas, "h": np.sqrt(areas)}
         if self.needs_sides:
             values["sides"] = compute_side_density(boundary)
-        old = compute_centres(previous)
-        rough = self.needs_fields or self.expression.has_gradient
+        old_centres = compute_centres(previous)
+        depends_on_fields = self.needs_fields or self.expression.has_gradient
 
         def weigh(nodes):
             centres = compute_centres(nodes)
-            now = values | {"x": centres[0], "y": centres[1]}
-            found = self.expression.evaluate(now, lambda f: measure_gradient(f, old))
-            found = np.broadcast_to(found, cells)
-            for _ in range(self.smoothing if rough else 0):
-                found = smooth(found)
-            return weigh_points(found, centres)
+            named_values = values | {"x": centres[0], "y": centres[1]}
+            cell_weights = self.expression.evaluate(
+                named_values, lambda f: measure_gradient(f, old_centres)
+            )
+            cell_weights = np.broadcast_to(cell_weights, cells)
+            for _ in range(self.smoothing if depends_on_fields else 0):
+                cell_weights = smooth(cell_weights)
+            return weigh_points(cell_weights, centres)
 
         if self.expression.names & {"x", "y"}:
             return weigh
@@ -353,14 +361,15 @@ class Weight:
         return lambda nodes: fixed
 
     def _check_names(self) -> None:
-        known = [*GEOMETRY, *self.fields]
-        missing = sorted(self.expression.names & set(FIELDS) - set(known))
+        """Raise BadInput for names that are neither geometry nor fields of this flow."""
+        known_names = [*GEOMETRY, *self.fields]
+        missing = sorted(self.expression.names & set(FIELDS) - set(known_names))
         if missing and not self.fields:
             raise BadInput(
                 f"weight '{self.given}': there is no flow here, so no field '{missing[0]}'; "
                 "use x and y"
             )
-        self.expression.check_names(known)
+        self.expression.check_names(known_names)
 
 
 def compute_side_density(boundary: np.ndarray) -> np.ndarray:
@@ -388,16 +397,16 @@ def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
     differences = [
         np.gradient(field, axis=k) if field.shape[k] > 1 else 0.0 * field for k in (0, 1)
     ]
-    along, across = (
+    step_i, step_j = (
         np.gradient(centres, axis=k + 1) if field.shape[k] > 1 else np.zeros_like(centres)
         for k in (0, 1)
     )
-    least = ROUND_OFF_DIFFERENCE * np.abs(field).max()
-    f1, f2 = (np.where(np.abs(f) > least, f, 0.0) for f in differences)
-    area = along[0] * across[1] - along[1] * across[0]
-    g11 = (along**2).sum(axis=0)
-    g22 = (across**2).sum(axis=0)
-    g12 = (along * across).sum(axis=0)
+    round_off = ROUND_OFF_DIFFERENCE * np.abs(field).max()
+    f1, f2 = (np.where(np.abs(f) > round_off, f, 0.0) for f in differences)
+    area = step_i[0] * step_j[1] - step_i[1] * step_j[0]
+    g11 = (step_i**2).sum(axis=0)
+    g22 = (step_j**2).sum(axis=0)
+    g12 = (step_i * step_j).sum(axis=0)
     square = f1 * f1 * g22 - 2.0 * f1 * f2 * g12 + f2 * f2 * g11
     return np.sqrt(np.maximum(square, 0.0)) / np.maximum(np.abs(area), 1e-300)
 
@@ -405,8 +414,8 @@ def measure_gradient(field: np.ndarray, centres: np.ndarray) -> np.ndarray:
 def smooth(values: np.ndarray) -> np.ndarray:
     """One pass of (1, 2, 1)/4 along both directions, with reflection at the sides."""
     for _ in range(2):
-        wide = np.concatenate([values[:1], values, values[-1:]])
-        values = (0.5 * values + 0.25 * (wide[:-2] + wide[2:])).T
+        extended = np.concatenate([values[:1], values, values[-1:]])
+        values = (0.5 * values + 0.25 * (extended[:-2] + extended[2:])).T
     return np.ascontiguousarray(values)
 
 
@@ -428,7 +437,7 @@ class WeightedRegridder:
             )
         self.weight = Weight(weight, smoothing)
         self.boundary = boundary
-        if self.owns_sides and self.weight.needs_own:
+        if self.owns_sides and self.weight.needs_old_cells:
             raise BadInput(
                 f"{self.name}: equidistributed sides cannot follow 'own' or 'h', which come from "
                 "where the nodes lie; give a weight of x, y, 'sides' or fields"
@@ -455,8 +464,8 @@ class WeightedRegridder:
         """`boundary`, with the nodes of free sides redistributed if it places them."""
         if not self.owns_sides:
             return boundary
-        most = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
-        return distribute_on_sides(boundary, self.weight, previous, self.free_sides, most)
+        most_motion = np.inf if self.step_fraction is None else SIDE_MOTION * self.step_fraction
+        return distribute_on_sides(boundary, self.weight, previous, self.free_sides, most_motion)
 
 
 def distribute_on_sides(
@@ -464,35 +473,39 @@ def distribute_on_sides(
     weight: Weight,
     previous: np.ndarray,
     sides: tuple[str, ...] = SIDE_NAMES,
-    most: float = np.inf,
+    most_motion: float = np.inf,
 ) -> np.ndarray:
     """A copy of `boundary` with w ds constant on some of its sides, by theory R10.9.
 
     A weight of position is evaluated on the polylines of `boundary`; any other is that of the
-    adjacent cells on the grid `previous` and moves with them.  Nodes move by at most `most` (< 0.5)
-    of the shorter adjacent spacing from their relative position on the side in `previous`.
+    adjacent cells on the grid `previous` and moves with them.  Nodes move by at most `most_motion`
+    (< 0.5) of the shorter adjacent spacing from their relative position on the side in `previous`.
     """
     distributed = np.array(boundary, dtype=np.float64, order="C")
     cells = None if weight.by_position else weight.on(previous, boundary)(previous)
-    for name, side, beside in zip(SIDE_NAMES, SIDES, BESIDE, strict=True):
+    for name, side, cells_at_side in zip(SIDE_NAMES, SIDES, BESIDE, strict=True):
         if name not in sides:
             continue
         line = np.ascontiguousarray(boundary[side])
-        law = arc_spacing(line)
+        spacing = arc_spacing(line)
         if cells is None:
 
-            def weight_at(s, line=line, law=law):
-                return weight.at_points(np.interp(s, law, line[0]), np.interp(s, law, line[1]))
+            def weight_at(s, line=line, spacing=spacing):
+                return weight.at_points(
+                    np.interp(s, spacing, line[0]), np.interp(s, spacing, line[1])
+                )
 
             wanted = solve_ed1(weight_at, line.shape[1])
         else:
-            wanted = np.concatenate([[0.0], np.cumsum(1.0 / cells[beside])])
+            wanted = np.concatenate([[0.0], np.cumsum(1.0 / cells[cells_at_side])])
             wanted /= wanted[-1]
-        if np.isfinite(most):
-            here = arc_spacing(np.ascontiguousarray(previous[side]))
-            steps = np.diff(here)
-            reach = most * np.minimum(steps[1:], steps[:-1])
-            wanted[1:-1] = here[1:-1] + np.clip(wanted[1:-1] - here[1:-1], -reach, reach)
-        inner = np.array([np.interp(wanted, law, part) for part in line])
+        if np.isfinite(most_motion):
+            old_spacing = arc_spacing(np.ascontiguousarray(previous[side]))
+            steps = np.diff(old_spacing)
+            reach = most_motion * np.minimum(steps[1:], steps[:-1])
+            wanted[1:-1] = old_spacing[1:-1] + np.clip(
+                wanted[1:-1] - old_spacing[1:-1], -reach, reach
+            )
+        inner = np.array([np.interp(wanted, spacing, coordinate) for coordinate in line])
         distributed[side][:, 1:-1] = inner[:, 1:-1]
     return distributed

@@ -366,7 +366,7 @@ class Weight:
         missing = sorted(self.expression.names & set(FIELDS) - set(known_names))
         if missing and not self.fields:
             raise BadInput(
-                f"weight '{self.given}': there is no flow here, so no field '{missing[0]}'; "
+                f"weight '{self.weight}': there is no flow here, so no field '{missing[0]}'; "
                 "use x and y"
             )
         self.expression.check_names(known_names)

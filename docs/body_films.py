@@ -109,12 +109,12 @@ FILMS = {
 
 def shrink(film: Path, target: Path) -> None:
     """Write every second frame of a film, smaller and with few colours."""
+    pictures = [frame.convert("RGB") for frame in ImageSequence.Iterator(Image.open(film))]
     frames = []
-    for frame in list(ImageSequence.Iterator(Image.open(film)))[::2]:
-        picture = frame.convert("RGB")
+    for picture in pictures[::2]:
         height = round(picture.height * WIDTH / picture.width)
-        picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
-        frames.append(picture.quantize(COLOURS, dither=Image.Dither.NONE))
+        small = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+        frames.append(small.quantize(COLOURS, dither=Image.Dither.NONE))
     frames[0].save(
         target, save_all=True, append_images=frames[1:], duration=FRAME_TIME, loop=0, optimize=True
     )

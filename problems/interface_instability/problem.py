@@ -98,7 +98,6 @@ class InterfaceInstability(Results, Problem):
     units: ClassVar[dict[str, str]] = {
         **dict.fromkeys(("interface_mean", "interface_max", "interface_min", "amplitude"), "m"),
         **{"roughness": "m", "largest_turn": "deg", "far_transverse_speed": "m/s"},
-        **ZONE_UNITS,
     }
 
     def __init__(self, deck: InterfaceDeck, perturbation: Perturbation | None = None):
@@ -147,6 +146,8 @@ class InterfaceInstability(Results, Problem):
         arrival = (deck.gap * deck.wavelength + self.amplitude) / self.shock.shock_speed
         self.is_captured = deck.start == "captured"
         self.may_hand_over = self.is_captured or deck.handover or deck.handover_kct is not None
+        if self.may_hand_over:
+            self.units |= ZONE_UNITS
         self._check_handover()
         self.start = self._choose_start()
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0

@@ -164,12 +164,27 @@ class Segment:
 
 
 class Wall(Segment):
-    """Impermeable wall at rest without friction, or a line of symmetry."""
+    """Impermeable wall at rest without friction, or a line of symmetry.
+
+    clamped: a solid sticks to it, and goes along the wall as fast as the wall does.  Raises
+    BadInput for a clamped material without strength.
+    """
 
     kind = "wall"
     wall = WALL
     meets_bodies = True
     is_rigid = True
+
+    def __init__(self, block, side, start, stop, clamped=False):
+        super().__init__(block, side, start, stop)
+        if not isinstance(clamped, bool):
+            raise BadInput(f"{self}: {self.kind} segment: clamped = {clamped!r}; true or false")
+        if clamped and block.strength is None:
+            raise BadInput(
+                f"{self}: {self.kind} segment: clamped = true, and the material has no strength; "
+                "only a solid sticks to a wall"
+            )
+        self.clamped = clamped
 
 
 class Axis(Wall):
@@ -193,14 +208,17 @@ class Axis(Wall):
 
 
 class Piston(Wall):
-    """Wall moving with a given velocity: a pair of numbers [m/s] or a function of time."""
+    """Wall moving with a given velocity: a pair of numbers [m/s] or a function of time.
+
+    clamped: as of a wall.
+    """
 
     kind = "piston"
     wall = PISTON
     motion = NodeMotion.GIVEN
 
-    def __init__(self, block, side, start, stop, velocity):
-        super().__init__(block, side, start, stop)
+    def __init__(self, block, side, start, stop, velocity, clamped=False):
+        super().__init__(block, side, start, stop, clamped)
         self._velocity: Callable = velocity if callable(velocity) else (lambda t: velocity)
         self.check_numbers(self._velocity(0.0), ("u", "v"), "velocity")
 

@@ -13,7 +13,8 @@ class PerimeterPlan:
 
     `ghosts`, `speeds`, `fluxes`: the segments that fill these themselves; `walls` (n, 3), `opened`
     (n, 3): the others, for kernels, with their kinds and the rows of the states beyond; `pistons`:
-    indices of moving walls, whose velocities are in `wall_speeds` (n, 2); `inwards` (faces,): faces
+    indices of moving walls, whose velocities are in `wall_speeds` (n, 2); `clamped` (n,): the walls
+    to which solids stick; `inwards` (faces,): faces
     that need the next cells inward; `flowing_spans` (n, 2): the spans of faces that move with the
     flow; `counted` (n, 2): the spans through which totals change, of segments without a partner or
     with surface tension; `is_follower`: whether a sliding contact places nodes of these segments on
@@ -31,6 +32,7 @@ class PerimeterPlan:
         self.opened = _collect(
             [(s.first, s.last, s.beyond) for s in segments if s.beyond is not None], 3
         )
+        self.clamped = np.array([wall.clamped for wall in walls], dtype=np.bool_)
         self.pistons = [(n, wall) for n, wall in enumerate(walls) if wall.moves]
         self.wall_speeds = np.zeros((len(walls), 2))
         self.flowing_spans = _collect([(s.first, s.last) for s in segments if s.follows_flow], 2)

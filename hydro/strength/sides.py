@@ -147,18 +147,25 @@ def resolve_cell(values, i, j, nx, ny):
 def start_stress(values, state, shear, walls, inwards, first, sides, rim):
     """Ghosts of the stress beyond walls; normal stress in the states at faces.
 
-    values (4, ni + 2, nj + 2): the fields of a solid; shear (ni, nj) [Pa]; walls (n, 3), inwards
-    (faces,): of `PerimeterPlan`; the cells of the sides must be gathered.  sides (4, faces):
-    nothing acts along a face until a coupling says otherwise.
+    values (4, ni + 2, nj + 2): the fields of a solid; shear (ni, nj) [Pa]; walls: walls, their
+    velocities, whether they are clamped, and inwards (faces,): of `PerimeterPlan`; the cells of the
+    sides must be gathered.  sides (4, faces): nothing acts along a face until a coupling says
+    otherwise.
     """
     ni, nj = shear.shape
-    for wall in range(walls.shape[0]):
-        for k in range(walls[wall, 0], walls[wall, 1]):
+    spans, speeds, clamped = walls
+    for wall in range(spans.shape[0]):
+        for k in range(spans[wall, 0], spans[wall, 1]):
             nx, ny = find_normal(rim, k)
             s_xx, s_yy, s_xy = get_stress(rim, first, CARRIED_CELL, k)
             s_nn, s_tt, s_nt = resolve_stress(s_xx, s_yy, s_xy, nx, ny)
-            ghost = compose_stress(s_nn, s_tt, -s_nt, nx, ny)
-            put_stress(rim, first, CARRIED_GHOST, k, ghost)
+            # a solid slips on the wall, or is held by it
+            mirrored = s_nt if clamped[wall] else -s_nt
+            put_stress(rim, first, CARRIED_GHOST, k, compose_stress(s_nn, s_tt, mirrored, nx, ny))
+            if clamped[wall]:
+                excess = (rim[V, k] - speeds[wall, 1]) * nx - (rim[U, k] - speeds[wall, 0]) * ny
+                rim[U_GHOST, k] += 2.0 * excess * ny
+                rim[V_GHOST, k] -= 2.0 * excess * nx
     for k in range(rim.shape[1]):
         sides[SHEAR_STRESS, k] = 0.0
         if not inwards[k]:
@@ -297,13 +304,13 @@ def pull_along(rim, k, stress, speed, curved):
 def trace_stress(arrays, plan, wave_law, first, curved, sides, rim):
     """Stress in the traces on the moved faces; fluxes of walls and open sides, with it.
 
-    arrays: `SolidArrays`; plan: walls and open sides of `PerimeterPlan`.  sides (4, faces) is
-    filled: every face slips without friction, and goes as fast as it sweeps, until a coupling says
-    otherwise.
+    arrays: `SolidArrays`; plan: walls, as of `start_stress`, and open sides of `PerimeterPlan`.
+    sides (4, faces) is filled: every face but those of clamped walls slips without friction, and
+    goes as fast as it sweeps, until a coupling says otherwise.
     """
     shear = arrays.shear
     ni, nj = shear.shape
-    walls, opened = plan
+    (walls, speeds, clamped), opened = plan
     for k in range(rim.shape[1]):
         _, i, j = find_cell_of_face(k, ni, nj)
         press_with_stress(rim, first, k, arrays.shear_wave[i, j])
@@ -312,11 +319,30 @@ def trace_stress(arrays, plan, wave_law, first, curved, sides, rim):
         nx, ny = rim[NX, k], rim[NY, k]
         keep_face_speed(rim, sides, k, rim[SWEEP, k] / (nx * nx + ny * ny) ** 0.5)
     fill_wall_fluxes(rim, walls, wave_law, curved)
+    for wall in range(walls.shape[0]):
+        if not clamped[wall]:
+            continue
+        for k in range(walls[wall, 0], walls[wall, 1]):
+            _, i, j = find_cell_of_face(k, ni, nj)
+            hold_face(rim, sides, first, k, shear[i, j], (speeds[wall, 0], speeds[wall, 1]), curved)
     fill_open_fluxes(rim, opened, curved)
     carry_fields_through_open_sides(rim, opened)
     for number in range(opened.shape[0]):
         for k in range(opened[number, 0], opened[number, 1]):
             let_stress_pass(rim, sides, first, k, opened[number, 2] == RHO_TRACE, curved)
+
+
+@compiled_once(allocates=False)
+def hold_face(rim, sides, first, k, shear, wall_speed, curved):
+    """Shear stress on a face that a clamped wall takes along with its velocity."""
+    nx, ny = find_normal(rim, k)
+    along = wall_speed[1] * nx - wall_speed[0] * ny
+    z, speed, stress = find_shear_wave(rim, first, k, shear, RHO_TRACE)
+    stress = stress + z * (along - speed)
+    sides[SHEAR_STRESS, k] = stress
+    sides[SPEED_ALONG, k] = along
+    pull_along(rim, k, stress, along, curved)
+    keep_face_speed(rim, sides, k, rim[SWEEP, k] / (rim[NX, k] ** 2 + rim[NY, k] ** 2) ** 0.5)
 
 
 @compiled_once(allocates=False)

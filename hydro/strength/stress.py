@@ -130,7 +130,7 @@ class Stress:
         with np.errstate(all="ignore"):
             self.arrays.shear_wave[...] = add_shear_wave(0.0, self.arrays.shear, rho)
         start_stress(
-            block.get_start("carried"), block.start, self.arrays.shear, block.plan.walls,
+            block.get_start("carried"), block.start, self.arrays.shear, self._list_walls(block),
             block.plan.inwards, self.FIRST_FIELD, self.sides, block.rim.rows,
         )  # fmt: skip
 
@@ -169,9 +169,14 @@ class Stress:
     def trace(self, block: Any) -> None:
         """Phase 6, with the traces of the sides known, before the couplings' fluxes."""
         trace_stress(
-            self.arrays, (block.plan.walls, block.plan.opened), block.wave_law,
+            self.arrays, (self._list_walls(block), block.plan.opened), block.wave_law,
             self.FIRST_FIELD, block.geometry.curved, self.sides, block.rim.rows,
         )  # fmt: skip
+
+    @staticmethod
+    def _list_walls(block: Any) -> tuple[np.ndarray, ...]:
+        """The walls of a block, their velocities, and whether they are clamped."""
+        return block.plan.walls, block.plan.wall_speeds, block.plan.clamped
 
     def prepare(self, block: Any) -> None:
         """Phase 6, before the flow's update: stress on the faces inside."""

@@ -7,7 +7,16 @@ import functools
 import numpy as np
 import pytest
 
-from builders import box, check_restarts, free, march, wall_off
+from builders import (
+    box,
+    check_budget,
+    check_restarts,
+    collect_columns,
+    free,
+    march,
+    march_whole,
+    wall_off,
+)
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.carried.fields import CarriedField
@@ -339,3 +348,29 @@ def test_a_spinning_ring_stays_round_and_goes_on():
     finer, _ = spin((16, 96), 4e-6)
     assert abs(loss) < 5e-4
     assert abs(finer) < abs(loss) / 3.5, "second order at least"
+
+
+def test_a_clamped_wall_drags_a_solid_along():
+    """A shear wave runs from a wall that slides; from one without a clamp none does."""
+    speed = 10.0
+    shear_speed = (LAW.modulus / 2785.0) ** 0.5
+    for clamped in (True, False):
+        nodes = box((0.0, 0.0), (0.03, 0.0015), (60, 3))
+        slab = Block("slab", ALUMINIUM, nodes, 2785.0, 0.0, 0.0, 0.0, strength=LAW)
+        put(slab, "i_min", "piston", velocity=(0.0, speed), clamped=clamped)
+        free(slab, "i_max")
+        links = [join("periodic", (slab, "j_min"), (slab, "j_max"))]
+        simulation = Simulation([slab], links, t_end=6e-6)
+        rows = march_whole(simulation)
+        near = slab.centres[0] < 0.7 * shear_speed * simulation.t
+        v = slab.get_inside("state")[2]
+        s_xy = slab.get_inside("carried")[2]
+        if clamped:
+            assert v[near] == pytest.approx(speed, rel=2e-3)
+            assert s_xy[near] == pytest.approx(-speed * 2785.0 * shear_speed, rel=2e-3)
+            check_budget(collect_columns(rows), ("momentum_y", "energy"))
+        else:
+            assert np.abs(v).max() < 1e-9 and np.abs(s_xy).max() < 1e-3
+    with pytest.raises(BadInput, match="only a solid sticks to a wall"):
+        fluid = Block("fluid", ALUMINIUM, nodes, 2785.0, 0.0, 0.0, 0.0)
+        put(fluid, "i_min", "wall", clamped=True)

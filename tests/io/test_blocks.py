@@ -103,7 +103,7 @@ REFUSED = [  # what the deck has, what stands there instead, what is said
     ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "seam" }',
      'is made by [[link]]'),
     ('{ side = "i_max", kind = "outflow" }', '{ side = "i_max", kind = "wall", pressure = 1.0 }',
-     "wall segment: 'pressure' is given, and it has no options"),
+     "wall segment: there is no option 'pressure'"),
     ('name = "right"', 'name = "left"', "2 blocks are called 'left'"),
     ('u = 150.0\nv = 20.0\nmaterial = { eos = "ideal-gas", gamma = 1.4 }\ncells',
      'u = "1/(x - x)"\nmaterial = "air"\ncells',

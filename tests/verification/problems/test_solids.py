@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from builders import march_measured
+from builders import box, march, march_measured, wall_off
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.strength.laws import Perfect
+from shockgrid.problems.references.elastic_plastic import compute_impact, make_solid_at_rest
+from shockgrid.problems.references.layers import Layer, LayeredPlates
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.deck.reading import read_deck
 
@@ -70,10 +78,6 @@ def test_what_makes_no_solid_is_said_in_one_sentence(settings, words):
 
 
 def test_layers_of_the_reference_code_have_the_exact_waves():
-    from shockgrid.hydro.eos.materials import find_material
-    from shockgrid.problems.references.elastic_plastic import compute_impact, make_solid_at_rest
-    from shockgrid.problems.references.layers import Layer, LayeredPlates
-
     flyer = make_solid_at_rest(find_material("Al6061"))
     target = make_solid_at_rest(find_material("SS304"))
     plates = LayeredPlates([Layer(flyer, 5e-3, 150, 1000.0), Layer(target, 5e-3, 150)])
@@ -146,3 +150,27 @@ def test_decks_of_solids_refuse_what_makes_no_sense(deck, settings, words):
     with pytest.raises(BadInput, match=words) as caught:
         read_deck(deck, settings).make_problem()
     assert "\n" not in str(caught.value)
+
+
+def test_impact_of_two_metals_has_the_exact_contact():
+    speed = 1000.0
+    length = 6e-3
+    cells = 60
+    solids = [make_solid_at_rest(find_material(name)) for name in ("Al6061", "SS304")]
+    blocks = []
+    for name, place, u, solid in (("al", -length, speed, solids[0]), ("ss", 0.0, 0.0, solids[1])):
+        nodes = box((place, 0.0), (place + length, 2.0 * length / cells), (cells, 2))
+        law = Perfect(solid.shear_modulus, solid.yield_stress)
+        blocks.append(Block(name, solid.eos, nodes, solid.rho0, u, 0.0, 0.0, strength=law))
+    put(blocks[0], "i_min", "free-surface")
+    put(blocks[1], "i_max", "free-surface")
+    for block in blocks:
+        wall_off(block)
+    link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"))
+    march(Simulation(blocks, [link], t_end=0.7e-6, cfl=0.8))
+    exact = compute_impact(*solids, speed)
+    for block, near in ((blocks[0], slice(-8, -2)), (blocks[1], slice(2, 8))):
+        fields = block.cell_fields
+        assert np.median(fields["u"][near]) == pytest.approx(exact.u, rel=1e-3)
+        stress = (fields["p"] - fields["s_xx"])[near]
+        assert np.median(stress) == pytest.approx(exact.stress, rel=1e-3)

@@ -164,9 +164,9 @@ def test_impact_of_two_metals_has_the_exact_contact():
         blocks.append(Block(name, solid.eos, nodes, solid.rho0, u, 0.0, 0.0, strength=law))
     put(blocks[0], "i_min", "free-surface")
     put(blocks[1], "i_max", "free-surface")
+    link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"))
     for block in blocks:
         wall_off(block)
-    link = join("interface", (blocks[0], "i_max"), (blocks[1], "i_min"))
     march(Simulation(blocks, [link], t_end=0.7e-6, cfl=0.8))
     exact = compute_impact(*solids, speed)
     for block, near in ((blocks[0], slice(-8, -2)), (blocks[1], slice(2, 8))):

@@ -18,8 +18,8 @@ from shockgrid.hydro.contacts.parting import (
     find_normal_at,
     find_unit_normal,
 )
-from shockgrid.hydro.facets.lines import project
-from shockgrid.regrid.jit import kernel
+from shockgrid.hydro.facets.lines import measure_square, project
+from shockgrid.regrid.jit import compiled_once, kernel
 
 THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinner necks are cut
 THINNEST_FOLLOWED_PART = 0.5  # the same where the time step collapses in this block
@@ -27,6 +27,26 @@ THINNEST_FOLLOWED_PART = 0.5  # the same where the time step collapses in this b
 THINNEST_FIRST_PART = 0.1
 # of the way to the next node inwards: through a film it is no further in front of the other side
 MOST_FRONT_PART = 0.01
+SHARP_CORNER_SINE = 0.1  # of the angle of a corner below which it is crushed
+
+
+@compiled_once
+def is_blunt_corner(outlines, node, face, square):
+    """Whether a face is that beyond a neighbour of a node, at a corner that is not sharp.
+
+    square: of the distance of the node from the face [m²].  Where nodes crowd at a corner, the body
+    is no thinner there.
+    """
+    for beside in (outlines.before[node], outlines.after[node]):
+        if beside == NO_FACE:
+            continue
+        corner = outlines.starts[beside]
+        if beside == outlines.after[node]:
+            corner += 1
+        if face == outlines.before[corner] or face == outlines.after[corner]:
+            length = measure_square(outlines.nodes, outlines.starts[beside]) ** 0.5
+            return square > (SHARP_CORNER_SINE * length) ** 2
+    return False
 
 
 @kernel
@@ -62,6 +82,8 @@ def find_thinnest(outlines, inner, sizes, widest):
                     continue
                 _, away = project(nodes, start, x, y)
                 if away >= reach * reach:
+                    continue
+                if is_blunt_corner(outlines, node, a, away):
                     continue
                 # that look the other way, with the body between
                 face_x, face_y = find_unit_normal(nodes, start)

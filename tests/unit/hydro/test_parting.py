@@ -139,3 +139,16 @@ def test_ends_of_a_body_that_touch_are_no_neck(gap, taper):
     necks = Necks(simulation.meetings.bodies)
     necks._least_part = THINNEST_CELL_PART
     assert necks.find_cut() is None
+
+
+def test_nodes_that_crowd_at_a_corner_are_no_neck():
+    body, other = make_boxes((0.0, 0.0), (9.0, 9.0))
+    simulation = Simulation([body, other], [], t_end=1.0)
+    necks = Necks(simulation.meetings.bodies)
+    near = 0.5 * THINNEST_CELL_PART * 0.1
+    body.nodes[0, 1, 0] = near
+    assert necks.find_cut() is None
+    # but a corner that is crushed to a film
+    body.nodes[:, 1, 0] = 0.1, 0.0
+    body.nodes[:, 0, 1] = 0.1, near
+    assert necks.find_cut() is not None

@@ -86,7 +86,7 @@ def distribute_by_arc_length(
     """`count` nodes on the fine polyline `curve` (2, n) with its ends, even or by `spacing`."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=1)))])
     spacing = np.linspace(0.0, 1.0, count) if spacing is None else spacing
-    line = np.array([np.interp(spacing * arc[-1], arc, part) for part in curve])
+    line = np.array([np.interp(spacing * arc[-1], arc, coordinate) for coordinate in curve])
     line[:, 0] = curve[:, 0]
     line[:, -1] = curve[:, -1]
     return line
@@ -219,13 +219,13 @@ def _fingers(name: str, ni: int, nj: int, fingers: list[dict]) -> MovingDomain:
             across = x - finger["centre"]
             profile = np.exp(-np.log(2.0) * (2.0 * across / finger["width"]) ** 4)
             depth = amplitude * finger["length"] * profile
-            bend = finger.get("curl", 0.0) / finger["length"]
-            if bend == 0.0:
+            curvature = finger.get("curl", 0.0) / finger["length"]
+            if curvature == 0.0:
                 shape_y -= depth
             else:
-                angle = bend * depth
-                shape_x += (1.0 - np.cos(angle)) / bend + across * (np.cos(angle) - 1.0)
-                shape_y += -np.sin(angle) / bend + across * np.sin(angle)
+                angle = curvature * depth
+                shape_x += (1.0 - np.cos(angle)) / curvature + across * (np.cos(angle) - 1.0)
+                shape_y += -np.sin(angle) / curvature + across * np.sin(angle)
         return np.array([shape_x, shape_y])
 
     return march_line(name, start, _on_walls(curve_at))
@@ -364,12 +364,13 @@ CHICANE_TURN = np.radians(135.0)
 CHICANE_WIDTH = 0.3  # over the length of a leg
 
 
-def _between(first: np.ndarray, last: np.ndarray) -> Callable[[float], np.ndarray]:
+def _between(first_nodes: np.ndarray, last_nodes: np.ndarray) -> Callable[[float], np.ndarray]:
     """Every node moves on a straight line from its first to its last position."""
-    return lambda amplitude: (1.0 - amplitude) * first + amplitude * last
+    return lambda amplitude: (1.0 - amplitude) * first_nodes + amplitude * last_nodes
 
 
 def _parameters(ni: int, nj: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the lines across i and across j, from 0 to 1."""
     return np.linspace(0.0, 1.0, ni + 1), np.linspace(0.0, 1.0, nj + 1)
 
 
@@ -463,22 +464,22 @@ def airfoil(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 def _naca_0012() -> np.ndarray:
     """The profile (2, n) round its mid-chord, from the upper trailing edge to the lower one."""
-    part = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, FINE_CURVE_POINTS // 2)))  # 0 at the nose
-    root = np.sqrt(part)
-    half = 0.6 * (
-        0.2969 * root - 0.126 * part - 0.3516 * part**2 + 0.2843 * part**3 - 0.1015 * part**4
+    place = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, FINE_CURVE_POINTS // 2)))  # 0 at the nose
+    root = np.sqrt(place)
+    half_thickness = 0.6 * (
+        0.2969 * root - 0.126 * place - 0.3516 * place**2 + 0.2843 * place**3 - 0.1015 * place**4
     )
-    half[-1] = TAIL_HALF_THICKNESS
-    x = np.concatenate([part[::-1], part[1:]]) - 0.5
-    return np.array([x, np.concatenate([half[::-1], -half[1:]])])
+    half_thickness[-1] = TAIL_HALF_THICKNESS
+    x = np.concatenate([place[::-1], place[1:]]) - 0.5
+    return np.array([x, np.concatenate([half_thickness[::-1], -half_thickness[1:]])])
 
 
 def _c_shape(tail: float) -> np.ndarray:
     """Half circle to the left of the middle, straight lines to x = tail above and below."""
     angle = np.linspace(0.5 * np.pi, 1.5 * np.pi, FINE_CURVE_POINTS)
     arc = AIRFOIL_RADIUS * np.array([np.cos(angle), np.sin(angle)])
-    first = np.array([[tail], [AIRFOIL_RADIUS]])
-    return np.concatenate([first, arc, first * np.array([[1.0], [-1.0]])], axis=1)
+    line_start = np.array([[tail], [AIRFOIL_RADIUS]])
+    return np.concatenate([line_start, arc, line_start * np.array([[1.0], [-1.0]])], axis=1)
 
 
 def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -508,11 +509,13 @@ def chicane(ni: int = 60, nj: int = 40) -> MovingDomain:
 
 FINE_SIDE = 1200  # points on a side from which its nodes are interpolated
 
+# x and y of a side's points: functions of the parameter p along it, from 0 to 1, and of the
+# amplitude a of the motion, from 0 to 1
 Curve = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
 
-def _bend(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far: Curve):
-    """Domain between the curves j_min, j_max, i_min, i_max: points at p from 0 to 1, amplitude."""
+def _make_curved(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far: Curve):
+    """Domain between the curves j_min (`low`), j_max (`high`), i_min (`near`), i_max (`far`)."""
     p = np.linspace(0.0, 1.0, FINE_SIDE)
 
     def sides_at(amplitude: float) -> np.ndarray:
@@ -527,10 +530,12 @@ def _bend(name: str, ni: int, nj: int, low: Curve, high: Curve, near: Curve, far
     return march_sides(name, sides_at, SIDE_NAMES)
 
 
-def _bend_rectangle(name: str, ni: int, nj: int, low, high, near, far) -> MovingDomain:
-    """Rectangle 1.5 x 1 whose sides j_min, j_max, i_min, i_max shift up or right by functions of p
-    and the amplitude."""
-    return _bend(
+def _shift_rectangle(name: str, ni: int, nj: int, low, high, near, far) -> MovingDomain:
+    """Rectangle 1.5 x 1 whose sides j_min, j_max (up) and i_min, i_max (right) shift.
+
+    By functions of the parameter p along the side and of the amplitude a.
+    """
+    return _make_curved(
         name, ni, nj,
         lambda p, a: (1.5 * p, low(p, a)), lambda p, a: (1.5 * p, 1.0 + high(p, a)),
         lambda p, a: (near(p, a), p), lambda p, a: (1.5 + far(p, a), p),
@@ -546,10 +551,10 @@ def nozzle(ni: int = 60, nj: int = 40) -> MovingDomain:
     def wall(sign: float) -> Curve:
         return lambda p, a: (2.0 * p, sign * (1.0 - 0.7 * a * np.sin(np.pi * p) ** 2))
 
-    def end(at: float) -> Curve:
-        return lambda p, a: (at + 1.2 * a * p * (1.0 - p), 2.0 * p - 1.0)
+    def end(x: float) -> Curve:
+        return lambda p, a: (x + 1.2 * a * p * (1.0 - p), 2.0 * p - 1.0)
 
-    return _bend("nozzle", ni, nj, wall(-1.0), wall(1.0), end(0.0), end(2.0))
+    return _make_curved("nozzle", ni, nj, wall(-1.0), wall(1.0), end(0.0), end(2.0))
 
 
 def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -561,7 +566,7 @@ def waves(ni: int = 60, nj: int = 40) -> MovingDomain:
     def wave(p: np.ndarray, a: float, high: float, count: float) -> np.ndarray:
         return a * high * np.sin(2.0 * np.pi * count * p)
 
-    return _bend_rectangle(
+    return _shift_rectangle(
         "waves", ni, nj,
         lambda p, a: wave(p, a, 0.1, 2.5), lambda p, a: wave(p, a, 0.1, 1.5),
         lambda p, a: wave(p, a, 0.08, 1.0), lambda p, a: wave(p, a, 0.08, 2.0),
@@ -577,7 +582,7 @@ def _bulged(name: str, ni: int, nj: int, height: float) -> MovingDomain:
     def inward(p: np.ndarray, a: float) -> np.ndarray:
         return -bulge(p, a)
 
-    return _bend_rectangle(name, ni, nj, inward, bulge, inward, bulge)
+    return _shift_rectangle(name, ni, nj, inward, bulge, inward, bulge)
 
 
 def cushion(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -617,7 +622,7 @@ def crescent(ni: int = 60, nj: int = 40) -> MovingDomain:
         angle = along / radius
         return (radius + across) * np.cos(angle) - radius, (radius + across) * np.sin(angle)
 
-    return _bend("crescent", ni, nj, end(-1.0), end(1.0), ring(-0.5, 0.1), ring(0.5, 0.0))
+    return _make_curved("crescent", ni, nj, end(-1.0), end(1.0), ring(-0.5, 0.1), ring(0.5, 0.0))
 
 
 def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
@@ -629,7 +634,7 @@ def bulged_chevron(ni: int = 60, nj: int = 40) -> MovingDomain:
     def bulge(p: np.ndarray, a: float) -> np.ndarray:
         return a * 0.6 * p * (1.0 - p)
 
-    return _bend_rectangle("bulged_chevron", ni, nj, kink, kink, lambda p, a: -bulge(p, a), bulge)
+    return _shift_rectangle("bulged_chevron", ni, nj, kink, kink, lambda p, a: -bulge(p, a), bulge)
 
 
 DOMAINS: dict[str, Callable[..., MovingDomain]] = {shape.__name__: shape for shape in (

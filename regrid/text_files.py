@@ -76,8 +76,8 @@ def check_regular(path: str | Path) -> None:
 
     Pipes that a shell has put in a file's place pass.
     """
-    words = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
-    if not words and not str(path).startswith(PIPES):
+    is_ordinary = os.path.isdir(path) or os.path.isfile(path) or not os.path.exists(path)
+    if not is_ordinary and not str(path).startswith(PIPES):
         raise BadInput(f"{path} is not a file but a device, a pipe or a socket")
 
 
@@ -101,19 +101,19 @@ _TOO_LONG = "a whole number has hundreds of digits"
 
 def check_plain(value: Any) -> None:
     """Raise TooMuch for tables too deep and whole numbers beyond the largest float."""
-    level = [value]
+    items = [value]
     for _ in range(DEEPEST_NESTING):
-        inner: list[Any] = []
-        for word in level:
-            if isinstance(word, Mapping):
-                inner += word.values()
-            elif isinstance(word, list | tuple):
-                inner += word
-            elif isinstance(word, int) and word.bit_length() > MOST_BITS:
+        inner_items: list[Any] = []
+        for item in items:
+            if isinstance(item, Mapping):
+                inner_items += item.values()
+            elif isinstance(item, list | tuple):
+                inner_items += item
+            elif isinstance(item, int) and item.bit_length() > MOST_BITS:
                 raise TooMuch(_TOO_LONG)
-        if not inner:
+        if not inner_items:
             return
-        level = inner
+        items = inner_items
     raise TooMuch(_TOO_DEEP)
 
 
@@ -137,9 +137,9 @@ def _escape(character: str) -> str:
     return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
 
 
-def cut(text: str, most: int = MOST_SHOWN) -> str:
+def cut(text: str, longest: int = MOST_SHOWN) -> str:
     """`text` if it has at most so many characters, else its start and its end around "..."."""
-    if len(text) <= most:
+    if len(text) <= longest:
         return text
-    end = most // 3
-    return text[: most - end - 3] + "..." + text[-end:]
+    kept_at_end = longest // 3
+    return text[: longest - kept_at_end - 3] + "..." + text[-kept_at_end:]

@@ -405,13 +405,13 @@ class Workspace:
         numbers; an estimate of its residual in cells, infinite then, and where a spacing is kept;
         how far inner nodes are from interpolated positions at most, in old cell heights.
         """
-        check = check_residual_serial
+        check_residual = check_residual_serial
         if self._set_threads():
-            check = check_residual_threaded
+            check_residual = check_residual_threaded
         grids = (self.old, self.base, UPRIGHT)
         if self.framed_grids is not None:
             grids = self.framed_grids
-        total, self.marks = check.entry(
+        total, self.marks = check_residual.entry(
             self.base, grids, self.inputs, self.motion, (self.coarse.starts_i, self.coarse.sums),
             self.totals, (self.columns, self.extremes, self.scratch),
         )  # fmt: skip

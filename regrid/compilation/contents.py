@@ -96,7 +96,11 @@ def _has_names(value) -> bool:
 
 
 def _list_names(code: CodeType) -> set[str]:
-    inner = (_list_names(one) for one in code.co_consts if isinstance(one, CodeType))
+    inner = (
+        _list_names(code_object)
+        for code_object in code.co_consts
+        if isinstance(code_object, CodeType)
+    )
     return {*code.co_names, *code.co_freevars}.union(*inner)
 
 

@@ -56,8 +56,12 @@ SILENT_SECONDS = 3.0  # wall seconds of compiling from which on a person at a te
 
 def _tell() -> None:
     """Say once, to a person at a terminal, what the first call waits for."""
-    now = time.perf_counter() - _compiling.begun
-    if _compiling.told or not _compiling.begun or _compiling.seconds + now < SILENT_SECONDS:
+    current_seconds = time.perf_counter() - _compiling.begun
+    if (
+        _compiling.told
+        or not _compiling.begun
+        or _compiling.seconds + current_seconds < SILENT_SECONDS
+    ):
         return
     _compiling.told = True
     if sys.stderr is not None and sys.stderr.isatty():
@@ -104,7 +108,7 @@ def interrupts_kept():
 
 def is_interpreted(arguments: tuple) -> bool:
     """Whether a first call with these arguments runs as Python."""
-    numbers = sum(one.size for one in arguments if isinstance(one, np.ndarray))
+    numbers = sum(argument.size for argument in arguments if isinstance(argument, np.ndarray))
     return is_interpreting() and numbers <= MOST_NUMBERS
 
 
@@ -133,8 +137,8 @@ def stopped_clock() -> Iterator[None]:
 def count_compiling() -> tuple[int, int, float]:
     """Kernels that Python has called until now; how many kernels had to be compiled for them; wall
     seconds [s] of compiling and loading them."""
-    now = time.perf_counter() - _compiling.begun if _compiling.begun else 0.0
-    return _compiling.ready, _compiling.compiled, _compiling.seconds + now
+    current_seconds = time.perf_counter() - _compiling.begun if _compiling.begun else 0.0
+    return _compiling.ready, _compiling.compiled, _compiling.seconds + current_seconds
 
 
 def read_processor_time() -> float:

@@ -36,9 +36,9 @@ def find_cache() -> Path:
     return Path(os.environ.get("SHOCKGRID_CACHE_DIR") or os.path.join(home, "shockgrid"))
 
 
-def find_kept(name: str, *words: str) -> Path:
+def find_kept(name: str, *causes: str) -> Path:
     """The file of the cache for what these words, the compiler and the processor determine."""
-    key = hashlib.sha256(repr((words, find_machine(), VERSIONS)).encode()).hexdigest()
+    key = hashlib.sha256(repr((causes, find_machine(), VERSIONS)).encode()).hexdigest()
     return find_cache() / "kernels" / f"{name}-{key[:24]}.kept"
 
 
@@ -54,10 +54,10 @@ def read_kept(path: Path) -> bytes:
     used before all of it is known to be as it was written.  Raises OSError where there is no file
     that can be read, ValueError where it is damaged or cut off.
     """
-    kept = path.read_bytes()
+    stored = path.read_bytes()
     size = hashlib.sha256().digest_size
-    checksum = kept[:size]
-    contents = kept[size:]
+    checksum = stored[:size]
+    contents = stored[size:]
     if checksum != compute_checksum(contents):
         raise ValueError(f"{path} is damaged")
     return contents
@@ -67,12 +67,12 @@ def keep(path: Path, contents: bytes) -> None:
     """Write a file of the cache; where nothing can be written the run goes on without."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(uuid.uuid4().hex)
-        part.write_bytes(compute_checksum(contents) + contents)
-        part.replace(path)
-        found = list(path.parent.iterdir())
-        if len(found) > KEPT_FILES:
-            for old in sorted(found, key=os.path.getmtime)[: -KEPT_FILES // 2]:
+        temporary = path.with_name(uuid.uuid4().hex)
+        temporary.write_bytes(compute_checksum(contents) + contents)
+        temporary.replace(path)
+        files = list(path.parent.iterdir())
+        if len(files) > KEPT_FILES:
+            for old in sorted(files, key=os.path.getmtime)[: -KEPT_FILES // 2]:
                 old.unlink()
 
 
@@ -93,7 +93,7 @@ def remember(name: str, inputs: Any, compute: Callable[[], Any]) -> Any:
     path = find_kept(name, digest_sources(), digest)
     with contextlib.suppress(OSError, ValueError):
         return pickle.loads(read_kept(path))
-    found = compute()
+    result = compute()
     if not is_interpreting():  # there the last bits may be others
-        keep(path, pickle.dumps(found))
-    return found
+        keep(path, pickle.dumps(result))
+    return result

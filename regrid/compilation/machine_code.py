@@ -108,10 +108,10 @@ class _Reader(pickle.Unpickler):
 
 def _rebuild_environment(module: str, constants: list, name: str) -> Environment:
     if module.startswith("numba.") and lookup_environment(name) is None:
-        made = Environment({})
-        made.consts[:] = constants
-        made.env_name = name
-        Environment._memo[name] = made
+        environment = Environment({})
+        environment.consts[:] = constants
+        environment.env_name = name
+        Environment._memo[name] = environment
     return _rebuild_env(module, constants, name)
 
 
@@ -120,10 +120,10 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
     if is_interpreted(arguments):
         return compiled.py_func
     with stopped_clock():
-        found = type(compiled)._compile_for_args(compiled, *arguments)
-    compiled.entry = found if len(compiled.overloads) == 1 else compiled
-    KERNEL_CODES.add(id(found))
-    return found
+        entry = type(compiled)._compile_for_args(compiled, *arguments)
+    compiled.entry = entry if len(compiled.overloads) == 1 else compiled
+    KERNEL_CODES.add(id(entry))
+    return entry
 
 
 def make_kernel(function, options: dict):

@@ -70,10 +70,10 @@ def read_checksums(folder: Path) -> str:
 def keep_checksums(folder: Path) -> None:
     """Write down what the folder's files are; where nothing can be written they are not used."""
     with contextlib.suppress(OSError):
-        part = folder / f"{CHECKSUMS}-{uuid.uuid4().hex}"
+        temporary = folder / f"{CHECKSUMS}-{uuid.uuid4().hex}"
         lines = list_checksums(folder)
-        part.write_text(lines, encoding="utf-8")
-        part.replace(folder / CHECKSUMS)
+        temporary.write_text(lines, encoding="utf-8")
+        temporary.replace(folder / CHECKSUMS)
 
 
 def open_folder(folder: Path) -> bool:

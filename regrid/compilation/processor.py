@@ -31,8 +31,8 @@ def widen_vectors() -> None:
     Kernels are a tenth to a fifth faster, with the same bits.  It holds for all that numba compiles
     in this process.  NUMBA_CPU_NAME and NUMBA_CPU_FEATURES take precedence.
     """
-    own = numba.config.CPU_NAME, numba.config.CPU_FEATURES
-    if own != (None, None) or llvmlite.binding.get_host_cpu_name() in SLOW_AT_512:
+    chosen = numba.config.CPU_NAME, numba.config.CPU_FEATURES
+    if chosen != (None, None) or llvmlite.binding.get_host_cpu_name() in SLOW_AT_512:
         return
     features = find_features()
     if "+avx512f" in features.split(","):

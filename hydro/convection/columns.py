@@ -136,7 +136,9 @@ def assemble_transport(
     """
     distance = measure_distances(x)
     spread = diffusivity * fit_diffusion(scheme, speed * distance / diffusivity) / distance
-    from_left, from_right = 0.5 * speed + spread, 0.5 * speed - spread  # F = l T_l + r T_r
+    # the flux is from_left times the value on the left plus from_right times that on the right
+    from_left = 0.5 * speed + spread
+    from_right = 0.5 * speed - spread
     return make_bands(from_left, from_right), np.array([-from_left[0], from_right[-1]])
 
 

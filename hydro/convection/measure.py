@@ -33,6 +33,7 @@ WANTED_EIGENVALUES = 4  # eigenvalues, of which the fastest is taken
 # distance of the filter's shift from the growth rate, over the free-fall rate
 FILTER_DETUNING = 1e-3
 FILTER_REPEATS = 20  # of the filter
+REFLECTED_POINTS = 3  # points beyond an insulated end that its mirror image adds
 
 
 def compute_local_nusselt(
@@ -93,15 +94,18 @@ def find_nusselt_maximum(
     k = SIDE_NAMES.index(side) // 2
     positions, nusselt = compute_local_nusselt(equations, fluid, temperature, side, scale)
     ends = equations.axes[1 - k].nodes[[0, -1]]
-    insulated = (equations.walls[s] in (adiabatic(), adiabatic("free")) for s in PAIRS[1 - k])
-    padding_low, padding_high = (3 * is_insulated for is_insulated in insulated)
-    padded_positions, padded_nusselt = (
-        np.pad(array, (padding_low, padding_high), "symmetric") for array in (positions, nusselt)
+    # beyond insulated ends: mirror images of the points
+    insulated = (adiabatic(), adiabatic("free"))
+    padding_low, padding_high = (
+        REFLECTED_POINTS if equations.walls[neighbour] in insulated else 0
+        for neighbour in PAIRS[1 - k]
     )
+    padding = padding_low, padding_high
+    padded_positions = np.pad(positions, padding, "symmetric")
+    padded_nusselt = np.pad(nusselt, padding, "symmetric")
+    first_beyond = padded_positions.size - padding_high
     padded_positions[:padding_low] = 2 * ends[0] - padded_positions[:padding_low]
-    padded_positions[padded_positions.size - padding_high :] = (
-        2 * ends[1] - padded_positions[padded_positions.size - padding_high :]
-    )
+    padded_positions[first_beyond:] = 2 * ends[1] - padded_positions[first_beyond:]
     return find_maximum(padded_positions, padded_nusselt, (ends, positions[[0, -1]]))
 
 

@@ -45,9 +45,9 @@ SLOPE_PARTS = 3
 # kept sharp
 SQUARED_SOUND, HLL_SWITCH, ACOUSTIC_PART, SHARP = range(4)
 MARK_ROWS = 4
-ROUND_OFF_FRACTION = 1e-9  # of a material, less than nothing of it, that is no mistake
+ROUND_OFF_FRACTION = 1e-13  # of a material, less than nothing of it, that is no mistake
 # volume fraction of either material from which on a cell has both
-LEAST_SHARP_FRACTION = 1e-6
+LEAST_SHARP_FRACTION = 1e-4
 
 
 @inlined

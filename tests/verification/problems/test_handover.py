@@ -39,6 +39,7 @@ def test_masses_momentum_and_energy_stay_over_the_handover(keys, sides):
     assert np.isfinite(mean).all()
 
 
+@pytest.mark.slow
 def test_place_width_and_modes_go_on_over_the_handover():
     history = march_problem(make_problem(cells=48, kct_end=6.5, handover_kct=6.0))
     row = find_handover(history)
@@ -52,6 +53,7 @@ def test_place_width_and_modes_go_on_over_the_handover():
     assert 1.2 * amplitude < profile < 2.0 * amplitude, "of a cosine 1.6 times"
 
 
+@pytest.mark.slow
 def test_no_step_fails_where_a_shock_comes_back_through_both_materials():
     """Round-off of a material that is not there is no lack of it."""
     gases = {"first": Fluid(gamma=1.4, rho=1.0), "second": Fluid(gamma=1.093, rho=5.1)}

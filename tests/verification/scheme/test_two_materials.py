@@ -34,6 +34,7 @@ STIFF = [pytest.param(name, marks=pytest.mark.slow) for name in list(CONTACTS)[1
 # the same without velocity, and the pressure behind a shock in the first
 SHOCKS = {
     "air, sulphur hexafluoride": (AIR, 1.2, HEAVY_GAS, 5.1, 1e5, 3e5),
+    "air, helium": (AIR, 1.2, IdealGas(1.67), 0.166, 1e5, 3e5),
     "air, water": (AIR, 1.2, WATER, 1000.0, 1e5, 1e6),
     "water, air": (WATER, 1000.0, AIR, 1.2, 1e5, 1e8),
     "aluminium, lead": (ALUMINIUM, 2707.0, LEAD, 11340.0, 0.0, 1e10),
@@ -175,7 +176,7 @@ def test_a_shock_passes_a_contact_as_in_the_exact_solution():
 def test_errors_of_a_shock_through_a_contact_fall_with_the_cells(name):
     coarse = measure_errors(name, 100)
     fine = measure_errors(name, 400)
-    assert (coarse / fine).min() > 4.0**0.85, "first order, but for where a shock falls in a cell"
+    assert (coarse / fine).min() > 4.0**0.9, "first order, but for where a shock falls in a cell"
 
 
 def make_gust(cells=24):

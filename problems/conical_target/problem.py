@@ -180,7 +180,7 @@ class ConicalTarget(seen.Results, Problem):
         blocks = {block.name: block for block in evolution.blocks}
         front = blocks["front"]
         cone = blocks["cone"]
-        measured = {name: seen.measure_block(block) for name, block in blocks.items()}
+        measured = {name: seen.measure_peak(block) for name, block in blocks.items()}
         greatest, x, y, transformed = measured["cone"]
         row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
         row |= {"greatest_x": x, "greatest_y": y}

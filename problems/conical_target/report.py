@@ -34,7 +34,7 @@ GPA = 1e-9
 US = 1e6
 
 
-def measure_block(block: Block) -> tuple[float, float, float, float]:
+def measure_peak(block: Block) -> tuple[float, float, float, float]:
     """Of a block: greatest pressure [Pa], the centre x, y [m] of that cell, the part of the mass in
     its second phase (NaN but for the cone)."""
     rho, _, _, p = block.state[:, 1:-1, 1:-1]

@@ -316,41 +316,19 @@ class Workspace:
         """
         tuning = tuning or self.tuning
         epsilon = float(tuning.epsilon)
-        # lines that take the shapes of the sides
-        share_i = 0.0
-        share_j = 0.0
+        # lines that take the shapes of the sides (R4.16), with the least epsilon of (R4.17)
+        is_curved = False
         if curved:
             share_i, share_j, least_epsilon = weigh_curves(
                 self.sides, tuning.open_side, tuning.closed_side, tuning.curved_barrier,
                 tuning.half_barrier,
             )  # fmt: skip
-            if share_i + share_j > 0.0:
+            is_curved = share_i + share_j > 0.0
+            if is_curved:
                 fill_curves(self.sides, share_i, share_j, self.curve)
                 epsilon = max(epsilon, least_epsilon)
-        keeps_spacing, shares_i, shares_j, ease = self._take_shares()
-        inputs = BarrierInputs(
-            *tuning.get_weights(epsilon, 1.0, cost),
-            along_i=self.along_i,
-            along_j=self.along_j,
-            blend_i=self.blend_i,
-            blend_j=self.blend_j,
-            departs=self.departs,
-            spacing_departure=self.spacing_departure,
-            most_departure=self.most_departure,
-            chords=self.chords,
-            keeps_spacing=keeps_spacing,
-            shares_i=shares_i,
-            shares_j=shares_j,
-            ease=ease,
-            curve=self.curve,
-            curved=share_i + share_j > 0.0,
-            ki=float(ki),
-            kj=float(kj),
-            sigma=0.0,
-            area_target=0.0,
-            sound=self.sound,
-            cost_scale=0.0,
-        )
+        weights = tuning.get_weights(epsilon, 1.0, cost)
+        inputs = self._gather_inputs(weights, float(ki), float(kj), is_curved)
         # all that follows from the sides alone
         self.symmetry = None
         self.motion = SideMotion(self.sides, *self.motion_tables)
@@ -375,11 +353,33 @@ class Workspace:
         )
         self.iterations = 0
 
-    def _take_shares(self) -> tuple[bool, np.ndarray, np.ndarray, np.ndarray]:
-        """The fields of `BarrierInputs` for a spacing that is kept."""
-        if self.spacing is None:
-            return False, self.no_shares, self.no_shares, self.no_shares[0]
-        return True, *self.spacing
+    def _gather_inputs(self, weights, ki: float, kj: float, is_curved: bool) -> Any:
+        """The `BarrierInputs` of the block, whose numbers `prepare` finds."""
+        no_shares = (self.no_shares, self.no_shares, self.no_shares[0])
+        shares_i, shares_j, ease = no_shares if self.spacing is None else self.spacing
+        return BarrierInputs(
+            *weights,
+            along_i=self.along_i,
+            along_j=self.along_j,
+            blend_i=self.blend_i,
+            blend_j=self.blend_j,
+            departs=self.departs,
+            spacing_departure=self.spacing_departure,
+            most_departure=self.most_departure,
+            chords=self.chords,
+            keeps_spacing=self.spacing is not None,
+            shares_i=shares_i,
+            shares_j=shares_j,
+            ease=ease,
+            curve=self.curve,
+            curved=is_curved,
+            ki=ki,
+            kj=kj,
+            sigma=0.0,
+            area_target=0.0,
+            sound=self.sound,
+            cost_scale=0.0,
+        )
 
     @property
     def is_simple(self) -> bool:

@@ -365,81 +365,83 @@ def sweep_first(residual, edges, tau, work, start, stop):
                     row[k] += factors[k] * row_after[k]
 
 
-@kernel
-def sweep_plane(residual, edges, tau, work, nodes, i, turned):
-    """Solve `(C + tau L2) d = C d`, then `(C + tau L3) d = C d` in plane i; add d to the nodes.
+@inlined
+def add_next_rows(lines, factors, k):
+    """Backward substitution: add to lines k, of x, y and z, their factors times the next ones."""
+    for c in range(3):
+        row = lines[c, k]
+        next_row = lines[c, k + 1]
+        row_factors = factors[k]
+        for j in range(row.shape[0]):
+            row[j] += row_factors[j] * next_row[j]
 
-    turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved together.
-    """
-    e2 = edges[1][i]
-    e3 = edges[2][i]
-    scale = work[0, i]
-    factor_rows = work[1, i]
-    x, y, z = residual[0, i], residual[1, i], residual[2, i]
-    n = residual.shape[2]
-    m = residual.shape[3]
-    # along j: forward, then backward
+
+@inlined
+def sweep_along_j(plane, edges, scale, tau, upper):
+    """Solve `(C + tau L2) d = C d` in a plane (3, n2, n3), forward, then backward along j."""
+    n = plane.shape[1]
+    x, y, z = plane[0], plane[1], plane[2]
     for j in range(n):
         before = max(j - 1, 0)
         link = tau if j > 0 else 0.0
         lines = (x[j], y[j], z[j])
         lines_before = (x[before], y[before], z[before])
-        eliminate(
-            lines,
-            lines_before,
-            (e2[j], e2[j + 1]),
-            scale[j],
-            0.0,
-            tau,
-            link,
-            (factor_rows[before], factor_rows[j]),
-        )
+        line_edges = (edges[j], edges[j + 1])
+        factors = (upper[before], upper[j])
+        eliminate(lines, lines_before, line_edges, scale[j], 0.0, tau, link, factors)
     for j in range(n - 2, -1, -1):
-        for c in range(3):
-            row = residual[c, i, j]
-            row_after = residual[c, i, j + 1]
-            factors = factor_rows[j]
-            for k in range(m):
-                row[k] += factors[k] * row_after[k]
-    # lines along k, transposed
+        add_next_rows(plane, upper, j)
+
+
+@inlined
+def transpose_lines(plane, edges, scale, turned):
+    """Transpose the lines along k of a plane (3, n2, n3), their scales and edges into `turned`."""
+    n = plane.shape[1]
+    m = plane.shape[2]
     for j in range(n):
-        row_x = x[j]
-        row_y = y[j]
-        row_z = z[j]
+        row_x = plane[0, j]
+        row_y = plane[1, j]
+        row_z = plane[2, j]
         scale_row = scale[j]
-        edge = e3[j]
+        edge_row = edges[j]
         for k in range(m):
             turned[0, k, j] = row_x[k]
             turned[1, k, j] = row_y[k]
             turned[2, k, j] = row_z[k]
             turned[SCALE_ROW, k, j] = scale_row[k]
-            turned[EDGE_ROW, k, j] = edge[k]
-        turned[EDGE_ROW, m, j] = edge[m]
-    # solved: forward, then backward
+            turned[EDGE_ROW, k, j] = edge_row[k]
+        turned[EDGE_ROW, m, j] = edge_row[m]
+
+
+@inlined
+def sweep_along_k(turned, n, m, tau):
+    """Solve `(C + tau L3) d = C d` for m transposed lines of n numbers; scales become factors."""
     for k in range(m):
         before = max(k - 1, 0)
         link = tau if k > 0 else 0.0
         lines = turned[0, k, :n], turned[1, k, :n], turned[2, k, :n]
         lines_before = (turned[0, before, :n], turned[1, before, :n], turned[2, before, :n])
         scale_row = turned[SCALE_ROW, k, :n]
-        low, high = turned[EDGE_ROW, k, :n], turned[EDGE_ROW, k + 1, :n]
-        eliminate(
-            lines,
-            lines_before,
-            (low, high),
-            scale_row,
-            0.0,
-            tau,
-            link,
-            (turned[SCALE_ROW, before, :n], scale_row),
-        )
+        line_edges = turned[EDGE_ROW, k, :n], turned[EDGE_ROW, k + 1, :n]
+        factors = (turned[SCALE_ROW, before, :n], scale_row)
+        eliminate(lines, lines_before, line_edges, scale_row, 0.0, tau, link, factors)
     for k in range(m - 2, -1, -1):
-        for c in range(3):
-            row = turned[c, k]
-            row_after = turned[c, k + 1]
-            factors = turned[SCALE_ROW, k]
-            for j in range(n):
-                row[j] += factors[j] * row_after[j]
+        add_next_rows(turned[:3, :, :n], turned[SCALE_ROW, :, :n], k)
+
+
+@kernel
+def sweep_plane(residual, edges, tau, work, nodes, i, turned):
+    """Solve `(C + tau L2) d = C d`, then `(C + tau L3) d = C d` in plane i; add d to the nodes.
+
+    turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved together.
+    """
+    plane = residual[:, i]
+    scale = work[0, i]
+    n = residual.shape[2]
+    m = residual.shape[3]
+    sweep_along_j(plane, edges[1][i], scale, tau, work[1, i])
+    transpose_lines(plane, edges[2][i], scale, turned)
+    sweep_along_k(turned, n, m, tau)
     # added to the nodes
     for c in range(3):
         for j in range(n):

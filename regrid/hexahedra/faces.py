@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shockgrid.regrid.errors import BadInput, RegridFailure
-from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.jit import inlined, kernel
 from shockgrid.regrid.measure.faults import check_size, choose_unit, convert_nodes
 from shockgrid.regrid.measure.hexahedra import compute_corner_volumes, find_bad_hexahedra
 
@@ -216,6 +216,46 @@ def mix(spacing, i, u, v):
     return low + u * (high - low)
 
 
+@inlined
+def find_position(spacing_i, spacing_j, spacing_k, i, j, k):
+    """Position of a node in the unit cube: where lines between the edges' spacings cross."""
+    p = 0.25 * (spacing_i[0, 0, i] + spacing_i[0, 1, i] + spacing_i[1, 0, i] + spacing_i[1, 1, i])
+    q = 0.25 * (spacing_j[0, 0, j] + spacing_j[0, 1, j] + spacing_j[1, 0, j] + spacing_j[1, 1, j])
+    r = 0.25 * (spacing_k[0, 0, k] + spacing_k[0, 1, k] + spacing_k[1, 0, k] + spacing_k[1, 1, k])
+    for _ in range(CROSSING_ITERATIONS):
+        p, q, r = mix(spacing_i, i, q, r), mix(spacing_j, j, p, r), mix(spacing_k, k, p, q)
+    return p, q, r
+
+
+@inlined
+def blend_faces(f, i, j, k, position):
+    """Boolean sum of the values `f` on the faces at a node: faces less edges plus corners."""
+    n1 = f.shape[0] - 1
+    n2 = f.shape[1] - 1
+    n3 = f.shape[2] - 1
+    p, q, r = position
+    a = 1.0 - p
+    b = 1.0 - q
+    c = 1.0 - r
+    faces = (
+        (a * f[0, j, k] + p * f[n1, j, k])
+        + (b * f[i, 0, k] + q * f[i, n2, k])
+        + (c * f[i, j, 0] + r * f[i, j, n3])
+    )
+    edges = (
+        a * (b * f[0, 0, k] + q * f[0, n2, k])
+        + p * (b * f[n1, 0, k] + q * f[n1, n2, k])
+        + b * (c * f[i, 0, 0] + r * f[i, 0, n3])
+        + q * (c * f[i, n2, 0] + r * f[i, n2, n3])
+        + c * (a * f[0, j, 0] + p * f[n1, j, 0])
+        + r * (a * f[0, j, n3] + p * f[n1, j, n3])
+    )
+    corners = a * (
+        b * (c * f[0, 0, 0] + r * f[0, 0, n3]) + q * (c * f[0, n2, 0] + r * f[0, n2, n3])
+    ) + p * (b * (c * f[n1, 0, 0] + r * f[n1, 0, n3]) + q * (c * f[n1, n2, 0] + r * f[n1, n2, n3]))
+    return faces - edges + corners
+
+
 @kernel(allocates=False)
 def fill_blended(values, spacing_i, spacing_j, spacing_k, rows):
     """Boolean sum: fill the interior of `values` (m, n1+1, n2+1, n3+1) from its faces (R14.9).
@@ -228,65 +268,15 @@ def fill_blended(values, spacing_i, spacing_j, spacing_k, rows):
     for i in range(1, n1):
         for j in range(1, n2):
             for k in range(1, n3):
-                # coordinates of the node: where lines between the edges' spacings cross
-                p = 0.25 * (
-                    spacing_i[0, 0, i]
-                    + spacing_i[0, 1, i]
-                    + spacing_i[1, 0, i]
-                    + spacing_i[1, 1, i]
-                )
-                q = 0.25 * (
-                    spacing_j[0, 0, j]
-                    + spacing_j[0, 1, j]
-                    + spacing_j[1, 0, j]
-                    + spacing_j[1, 1, j]
-                )
-                r = 0.25 * (
-                    spacing_k[0, 0, k]
-                    + spacing_k[0, 1, k]
-                    + spacing_k[1, 0, k]
-                    + spacing_k[1, 1, k]
-                )
-                for _ in range(CROSSING_ITERATIONS):
-                    p, q, r = (
-                        mix(spacing_i, i, q, r),
-                        mix(spacing_j, j, p, r),
-                        mix(spacing_k, k, p, q),
-                    )
+                p, q, r = find_position(spacing_i, spacing_j, spacing_k, i, j, k)
                 rows[0, k] = p
                 rows[1, k] = q
                 rows[2, k] = r
-            # faces less edges plus corners (R14.9)
             for m in range(values.shape[0]):
-                f = values[m]
+                component = values[m]
                 for k in range(1, n3):
-                    p = rows[0, k]
-                    q = rows[1, k]
-                    r = rows[2, k]
-                    a = 1.0 - p
-                    b = 1.0 - q
-                    c = 1.0 - r
-                    faces = (
-                        (a * f[0, j, k] + p * f[n1, j, k])
-                        + (b * f[i, 0, k] + q * f[i, n2, k])
-                        + (c * f[i, j, 0] + r * f[i, j, n3])
-                    )
-                    edges = (
-                        a * (b * f[0, 0, k] + q * f[0, n2, k])
-                        + p * (b * f[n1, 0, k] + q * f[n1, n2, k])
-                        + b * (c * f[i, 0, 0] + r * f[i, 0, n3])
-                        + q * (c * f[i, n2, 0] + r * f[i, n2, n3])
-                        + c * (a * f[0, j, 0] + p * f[n1, j, 0])
-                        + r * (a * f[0, j, n3] + p * f[n1, j, n3])
-                    )
-                    corners = a * (
-                        b * (c * f[0, 0, 0] + r * f[0, 0, n3])
-                        + q * (c * f[0, n2, 0] + r * f[0, n2, n3])
-                    ) + p * (
-                        b * (c * f[n1, 0, 0] + r * f[n1, 0, n3])
-                        + q * (c * f[n1, n2, 0] + r * f[n1, n2, n3])
-                    )
-                    f[i, j, k] = faces - edges + corners
+                    position = (rows[0, k], rows[1, k], rows[2, k])
+                    component[i, j, k] = blend_faces(component, i, j, k, position)
 
 
 def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:

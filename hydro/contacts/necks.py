@@ -124,6 +124,7 @@ class Necks:
         for surface, span in zip(self.bodies.surfaces, self.bodies.spans, strict=True):
             inner = np.empty((2, surface.count + 1))
             surface.fill_inner(inner)
+            inner[:, [0, -1]] = inner[:, [1, -2]]  # at corners the node inwards of both sides
             self.inner[:, span] = inner
 
     def find_cut(self, collapsing: Block | None = None) -> str | None:

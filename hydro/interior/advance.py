@@ -61,6 +61,95 @@ from shockgrid.regrid.jit import Kernel, compiled_once, kernel
 TILE_ROWS = 32
 
 
+class Tile(NamedTuple):
+    """A tile: the cells [first_row, stop_row) x [first_j, stop_j) that it updates, and its scratch.
+
+    It reconstructs the columns [first_column, stop_column), `cells` of them.  Entry k of a row of
+    the scratch is column first_column + k - 1, so that its own cells have the entries [first_entry,
+    stop_entry).  Nodes: node_count from first_node on, from entry node_shift on.  padded, whole:
+    lengths of loops in whole vectors, with the next neighbour and without.
+    """
+
+    first_row: int
+    stop_row: int
+    first_j: int
+    stop_j: int
+    first_column: int
+    stop_column: int
+    cells: int
+    first_entry: int
+    stop_entry: int
+    first_node: int
+    node_shift: int
+    node_count: int
+    padded: int
+    whole: int
+
+
+@compiled_once(allocates=False)
+def find_tile(number, ni, nj):
+    """The `Tile` of this number in a block of ni x nj cells."""
+    chunks = (nj + scratch.CHUNK_CELLS - 1) // scratch.CHUNK_CELLS
+    first_row = (number // chunks) * TILE_ROWS
+    stop_row = min(ni, first_row + TILE_ROWS)
+    first_j = (number % chunks) * nj // chunks
+    stop_j = (number % chunks + 1) * nj // chunks
+    # one more column on either side is reconstructed
+    first_column = max(0, first_j - 1)
+    stop_column = min(nj, stop_j + 1)
+    cells = stop_column - first_column
+    first_node = max(0, first_column - 1)
+    return Tile(
+        first_row,
+        stop_row,
+        first_j,
+        stop_j,
+        first_column,
+        stop_column,
+        cells,
+        first_j - first_column + 1,
+        stop_j - first_column + 1,
+        first_node,
+        first_node - (first_column - 1),
+        min(nj, stop_column + 1) - first_node + 1,
+        scratch.count_padded(cells),
+        scratch.count_whole(cells),
+    )
+
+
+@compiled_once(allocates=False)
+def clear_sums(Z):
+    """Sums and extremes of a tile's columns before its first row."""
+    for k in range(SCRATCH_SPAN):
+        Z[scratch.LEAST_C2 + k] = 1e300
+        Z[scratch.FIRST_ORDER + k] = 0.0
+        Z[scratch.SUM_MASS + k] = 0.0
+        Z[scratch.SUM_X + k] = 0.0
+        Z[scratch.SUM_Y + k] = 0.0
+        Z[scratch.SUM_ENERGY + k] = 0.0
+        Z[scratch.SUM_VOIDED + k] = 0.0
+        Z[scratch.SUM_EMPTIED + k] = 0.0
+
+
+@compiled_once(allocates=False)
+def sum_columns(Z, tile, totals):
+    """Totals (8,) of a tile, from the sums of its columns; columns as in `hydro.rows`."""
+    least = 1e300
+    for q in range(TOTAL_ROWS):
+        totals[q] = 0.0
+    for k in range(tile.first_entry, tile.stop_entry):
+        c2 = Z[scratch.LEAST_C2 + k]
+        least = least if least < c2 else c2
+        totals[FIRST_ORDER] += Z[scratch.FIRST_ORDER + k]
+        totals[TOTAL_MASS] += Z[scratch.SUM_MASS + k]
+        totals[TOTAL_MOMENTUM_X] += Z[scratch.SUM_X + k]
+        totals[TOTAL_MOMENTUM_Y] += Z[scratch.SUM_Y + k]
+        totals[TOTAL_ENERGY] += Z[scratch.SUM_ENERGY + k]
+        totals[VOIDED] += Z[scratch.SUM_VOIDED + k]
+        totals[EMPTIED] += Z[scratch.SUM_EMPTIED + k]
+    totals[LEAST_C2] = least
+
+
 class FlowKernels(NamedTuple):
     """Kernels of one equation of state; `advance` and `advance_threaded` share one signature.
 
@@ -182,7 +271,38 @@ def make_flow_kernels(
             copy_rows(solid.hoop, row, start, count, Z, scratch.STRESS_SPREAD + 1)
 
     @compiled_once(allocates=False)
-    def advance_tile(old, new, rim, dt, parameters, tile, Z, tile_totals):
+    def load_first_rows(old, nodes_new, rim, tile, inverse_dt, Z):
+        """Load the rows before the first one that is reconstructed; returns that one's number.
+
+        The row before it is loaded as the current one, then shifted.
+        """
+        state, _, nodes = old[:3]
+        start = tile.first_node
+        count = tile.node_count
+        shift = tile.node_shift
+        row = max(0, tile.first_row - 1)
+        if row > 0:
+            copy_rows(nodes, row - 1, start, count, Z, scratch.X_HIGH + shift)
+            copy_rows(nodes, row, start, count, Z, scratch.X_NEXT + shift)
+            measure_after(Z, tile.padded)
+        else:
+            copy_row(rim, LENGTH_GHOST, tile.first_column, tile.cells, Z, scratch.LENGTH_AFTER + 1)
+            if curved:
+                clear_shift_after(Z, tile.padded)
+            copy_rows(nodes, 0, start, count, Z, scratch.X_NEXT + shift)
+        copy_rows(state, row, tile.first_column, tile.cells + 2, Z, scratch.RHO_AFTER)
+        next_row(Z, tile.padded)
+        copy_rows(nodes_new, row, start, count, Z, scratch.X_HIGH_NEW + shift)
+        copy_rows(nodes, row + 1, start, count, Z, scratch.X_NEXT + shift)
+        measure_after(Z, tile.padded)
+        copy_rows(state, row + 1, tile.first_column, tile.cells + 2, Z, scratch.RHO_AFTER)
+        fill_steps(Z, tile.whole)
+        fill_faces_i(Z, tile.whole, inverse_dt)
+        next_row(Z, tile.padded)
+        return row
+
+    @compiled_once(allocates=False)
+    def advance_tile(old, new, rim, dt, parameters, number, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
         state, void_energy, nodes = old[:3]
         state_new, void_energy_new, nodes_new, rates_new, crowding_new, mass_i, mass_j = new
@@ -190,115 +310,78 @@ def make_flow_kernels(
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
-        chunks = (nj + scratch.CHUNK_CELLS - 1) // scratch.CHUNK_CELLS
-        first_row = (tile // chunks) * TILE_ROWS
-        stop_row = min(ni, first_row + TILE_ROWS)
-        first_j = (tile % chunks) * nj // chunks
-        stop_j = (tile % chunks + 1) * nj // chunks
-        first_column = max(0, first_j - 1)  # reconstructed: up to stop_column - 1
-        stop_column = min(nj, stop_j + 1)
-        cells = stop_column - first_column
-        # loop lengths in whole vectors: with the next neighbour, without
-        padded = scratch.count_padded(cells)
-        whole = scratch.count_whole(cells)
-        # scratch entry k is column first_column + k - 1; node columns from node0 on are there
-        node0 = max(0, first_column - 1)
-        shift = node0 - (first_column - 1)
-        node_count = min(nj, stop_column + 1) - node0 + 1
-        first_entry = first_j - first_column + 1
-        stop_entry = stop_j - first_column + 1
-        for k in range(SCRATCH_SPAN):
-            Z[scratch.LEAST_C2 + k] = 1e300
-            Z[scratch.FIRST_ORDER + k] = 0.0
-            Z[scratch.SUM_MASS + k] = 0.0
-            Z[scratch.SUM_X + k] = 0.0
-            Z[scratch.SUM_Y + k] = 0.0
-            Z[scratch.SUM_ENERGY + k] = 0.0
-            Z[scratch.SUM_VOIDED + k] = 0.0
-            Z[scratch.SUM_EMPTIED + k] = 0.0
-        row = max(0, first_row - 1)
-        # the row before the first one is loaded as the current one, then shifted
-        if row > 0:
-            copy_rows(nodes, row - 1, node0, node_count, Z, scratch.X_HIGH + shift)
-            copy_rows(nodes, row, node0, node_count, Z, scratch.X_NEXT + shift)
-            measure_after(Z, padded)
-        else:
-            copy_row(rim, LENGTH_GHOST, first_column, cells, Z, scratch.LENGTH_AFTER + 1)
-            if curved:
-                clear_shift_after(Z, padded)
-            copy_rows(nodes, 0, node0, node_count, Z, scratch.X_NEXT + shift)
-        copy_rows(state, row, first_column, cells + 2, Z, scratch.RHO_AFTER)
-        next_row(Z, padded)
-        copy_rows(nodes_new, row, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
-        copy_rows(nodes, row + 1, node0, node_count, Z, scratch.X_NEXT + shift)
-        measure_after(Z, padded)
-        copy_rows(state, row + 1, first_column, cells + 2, Z, scratch.RHO_AFTER)
-        fill_steps(Z, whole)
-        fill_faces_i(Z, whole, inverse_dt)
-        next_row(Z, padded)
+        tile = find_tile(number, ni, nj)
+        cells = tile.cells
+        padded = tile.padded
+        whole = tile.whole
+        column = tile.first_column
+        first_node = tile.first_node
+        node_count = tile.node_count
+        shift = tile.node_shift
+        entry = tile.first_entry
+        first_j = tile.first_j
+        count = tile.stop_j - tile.first_j
+        clear_sums(Z)
+        row = load_first_rows(old, nodes_new, rim, tile, inverse_dt, Z)
         # cells whose HLL switch is on: this row, the row before
         first_hll_cell = cells + 1
         last_hll_cell = 0
         first_hll_before = cells + 1
         last_hll_before = 0
-        while row <= stop_row:
-            inside = first_row <= row < stop_row
-            counted = 1.0 if inside else 0.0
+        while row <= tile.stop_row:
+            is_own = tile.first_row <= row < tile.stop_row
+            counted = 1.0 if is_own else 0.0
             if row < ni:
-                copy_rows(nodes_new, row + 1, node0, node_count, Z, scratch.X_HIGH_NEW + shift)
-                copy_rows(state, row + 2, first_column, cells + 2, Z, scratch.RHO_AFTER)
+                # what lies after the row, and what its cells hold besides their state
+                copy_rows(nodes_new, row + 1, first_node, node_count, Z, scratch.X_HIGH_NEW + shift)
+                copy_rows(state, row + 2, column, cells + 2, Z, scratch.RHO_AFTER)
                 if row + 1 < ni:
-                    copy_rows(nodes, row + 2, node0, node_count, Z, scratch.X_NEXT + shift)
+                    copy_rows(nodes, row + 2, first_node, node_count, Z, scratch.X_NEXT + shift)
                     measure_after(Z, padded)
                 else:
-                    copy_row(
-                        rim, LENGTH_GHOST, nj + first_column, cells, Z, scratch.LENGTH_AFTER + 1
-                    )
+                    copy_row(rim, LENGTH_GHOST, nj + column, cells, Z, scratch.LENGTH_AFTER + 1)
                     if curved:
                         clear_shift_after(Z, padded)
                 if opens_voids:
-                    copy_row(void_energy, row, first_column, cells, Z, scratch.VOID_LOADED + 1)
+                    copy_row(void_energy, row, column, cells, Z, scratch.VOID_LOADED + 1)
                 if is_solid:
-                    load_stress(old[3], row, first_column, cells, Z)
+                    load_stress(old[3], row, column, cells, Z)
                 # prefetch what the next row reads and where this one's results are written
-                prefetch_rows(state, min(row + 3, ni + 1), first_column, cells + 2)
-                prefetch_rows(nodes, min(row + 3, ni), node0, node_count)
-                prefetch_rows(nodes_new, min(row + 2, ni), node0, node_count)
-                prefetch_rows(state_new, row, first_j + 1, stop_j - first_j)
-                prefetch_row(rates_new, max(row - 1, 0), first_j, stop_j - first_j)
-                prefetch_row(crowding_new, max(row - 1, 0), first_j, stop_j - first_j)
+                prefetch_rows(state, min(row + 3, ni + 1), column, cells + 2)
+                prefetch_rows(nodes, min(row + 3, ni), first_node, node_count)
+                prefetch_rows(nodes_new, min(row + 2, ni), first_node, node_count)
+                prefetch_rows(state_new, row, first_j + 1, count)
+                prefetch_row(rates_new, max(row - 1, 0), first_j, count)
+                prefetch_row(crowding_new, max(row - 1, 0), first_j, count)
                 if opens_voids:
-                    prefetch_row(void_energy, min(row + 1, ni - 1), first_column, cells)
-                    prefetch_row(void_energy_new, max(row - 1, 0), first_j, stop_j - first_j)
-                length_below = rim[LENGTH_GHOST, 2 * nj + row] if first_column == 0 else -1.0
-                length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if stop_column == nj else -1.0
+                    prefetch_row(void_energy, min(row + 1, ni - 1), column, cells)
+                    prefetch_row(void_energy_new, max(row - 1, 0), first_j, count)
+                # slopes and half step of the row, its traces towards -i
+                at_low = column == 0
+                at_high = tile.stop_column == nj
+                length_below = rim[LENGTH_GHOST, 2 * nj + row] if at_low else -1.0
+                length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if at_high else -1.0
                 reconstruct(Z, cells, padded, length_below, length_above, 0.5 * dt, parameters)
                 first_hll_before = first_hll_cell
                 last_hll_before = last_hll_cell
                 first_hll_cell, last_hll_cell = find_hll(Z, cells)
                 if curved:
                     fill_source_pressure(Z, padded, parameters)
-                if row >= first_row:
+                if row >= tile.first_row:
                     fill_traces_in(Z, whole, counted, parameters)
+            # fluxes towards -i; those of a rim are outward
             if row == 0:
                 for q in range(FLUX_ROWS):
-                    for k in range(cells):  # fluxes of a rim are outward
-                        Z[scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1 + k] = -rim[
-                            MASS + q, first_column + k
-                        ]
+                    target = scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1
+                    for k in range(cells):
+                        Z[target + k] = -rim[MASS + q, column + k]
             elif row == ni:
                 for q in range(FLUX_ROWS):
-                    copy_row(
-                        rim,
-                        MASS + q,
-                        nj + first_column,
-                        cells,
-                        Z,
-                        scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1,
-                    )
-            elif row >= first_row:
+                    target = scratch.FLUX_I_MASS + q * SCRATCH_SPAN + 1
+                    copy_row(rim, MASS + q, nj + column, cells, Z, target)
+            elif row >= tile.first_row:
                 if is_solid:
-                    copy_rows(old[3].stress_i, row, first_column, cells, Z, scratch.STRESS_I + 1)
+                    copy_rows(old[3].stress_i, row, column, cells, Z, scratch.STRESS_I + 1)
                 fill_upwind_i(Z, whole)
                 fill_flux_i(Z, whole, parameters)
                 first_face = min(first_hll_cell, first_hll_before)
@@ -309,28 +392,19 @@ def make_flow_kernels(
                     fill_push_i(Z, padded)
                 if is_solid:
                     add_shear_flux_i(Z, padded)
-                    copy_rows_back(
-                        Z,
-                        scratch.SPEED_I_X + first_entry,
-                        stop_j - first_j,
-                        old[3].speed_i,
-                        row,
-                        first_j,
-                    )
-            if keeps_masses and row >= first_row:
-                copy_back(
-                    Z, scratch.FLUX_I_MASS + first_entry, stop_j - first_j, mass_i, row, first_j
-                )
-            if row < stop_row:
-                # the faces towards +i replace those towards -i, whose fluxes are known
+                    source = scratch.SPEED_I_X + entry
+                    copy_rows_back(Z, source, count, old[3].speed_i, row, first_j)
+            if keeps_masses and row >= tile.first_row:
+                copy_back(Z, scratch.FLUX_I_MASS + entry, count, mass_i, row, first_j)
+            # the other traces; faces towards +i replace those towards -i, whose fluxes are known
+            if row < tile.stop_row:
                 fill_faces_i(Z, whole, inverse_dt)
                 fill_faces_j(Z, padded, inverse_dt)
                 fill_traces(Z, whole, counted, parameters)
-            if inside:
+            # fluxes between the cells of the row, and through the sides at its ends
+            if is_own:
                 if is_solid:
-                    copy_rows(
-                        old[3].stress_j, row, first_column, cells + 1, Z, scratch.STRESS_J + 1
-                    )
+                    copy_rows(old[3].stress_j, row, column, cells + 1, Z, scratch.STRESS_J + 1)
                 fill_upwind_j(Z, whole)
                 fill_flux_j(Z, whole, parameters)
                 if first_hll_cell <= last_hll_cell:
@@ -339,82 +413,40 @@ def make_flow_kernels(
                     fill_push_j(Z, padded)
                 if is_solid:
                     add_shear_flux_j(Z, padded)
-                    copy_rows_back(
-                        Z,
-                        scratch.SPEED_J_X + first_entry,
-                        stop_j - first_j + 1,
-                        old[3].speed_j,
-                        row,
-                        first_j,
-                    )
+                    source = scratch.SPEED_J_X + entry
+                    copy_rows_back(Z, source, count + 1, old[3].speed_j, row, first_j)
                 if first_j == 0:
                     for q in range(FLUX_ROWS):
-                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + first_entry] = -rim[
-                            MASS + q, 2 * nj + row
-                        ]
-                if stop_j == nj:
+                        inward = -rim[MASS + q, 2 * nj + row]
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + entry] = inward
+                if tile.stop_j == nj:
                     for q in range(FLUX_ROWS):
-                        out = rim[MASS + q, 2 * nj + ni + row]
-                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + stop_entry] = out
+                        outward = rim[MASS + q, 2 * nj + ni + row]
+                        Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + tile.stop_entry] = outward
                 if keeps_masses:
-                    copy_back(
-                        Z,
-                        scratch.FLUX_J_MASS + first_entry,
-                        stop_j - first_j + 1,
-                        mass_j,
-                        row,
-                        first_j,
-                    )
-            if inside and row > first_row:
+                    copy_back(Z, scratch.FLUX_J_MASS + entry, count + 1, mass_j, row, first_j)
+            # the row before gets its new state, this one its fluxes
+            if is_own and row > tile.first_row:
                 update_rows(Z, whole, dt, inverse_dt, parameters)
-            elif inside:
+            elif is_own:
                 gather_flux(Z, whole, dt, inverse_dt, parameters)
-            elif row > first_row:
+            elif row > tile.first_row:
                 fill_new_state(Z, whole, dt, inverse_dt, parameters)
-            if row > first_row:
+            if row > tile.first_row:
                 for q in range(STATE_ROWS):
-                    new = scratch.RHO_NEW + q * SCRATCH_SPAN + first_entry
-                    copy_back(Z, new, stop_j - first_j, state_new[q], row, first_j + 1)
+                    source = scratch.RHO_NEW + q * SCRATCH_SPAN + entry
+                    copy_back(Z, source, count, state_new[q], row, first_j + 1)
                 if opens_voids:
-                    copy_back(
-                        Z,
-                        scratch.VOID_NEW + first_entry,
-                        stop_j - first_j,
-                        void_energy_new,
-                        row - 1,
-                        first_j,
-                    )
-                copy_back(
-                    Z, scratch.RATE_NEW + first_entry, stop_j - first_j, rates_new, row - 1, first_j
-                )
-                copy_back(
-                    Z,
-                    scratch.CROWDING_NEW + first_entry,
-                    stop_j - first_j,
-                    crowding_new,
-                    row - 1,
-                    first_j,
-                )
+                    copy_back(Z, scratch.VOID_NEW + entry, count, void_energy_new, row - 1, first_j)
+                copy_back(Z, scratch.RATE_NEW + entry, count, rates_new, row - 1, first_j)
+                copy_back(Z, scratch.CROWDING_NEW + entry, count, crowding_new, row - 1, first_j)
             next_row(Z, padded)
             if is_solid:
                 for k in range(SCRATCH_SPAN):
                     Z[scratch.SHEAR_BEFORE + k] = Z[scratch.SHEAR + k]
                     Z[scratch.SHEAR_WAVE_BEFORE + k] = Z[scratch.SHEAR_WAVE + k]
             row += 1
-        least = 1e300
-        for q in range(TOTAL_ROWS):
-            tile_totals[tile, q] = 0.0
-        for k in range(first_entry, stop_entry):
-            c2 = Z[scratch.LEAST_C2 + k]
-            least = least if least < c2 else c2
-            tile_totals[tile, FIRST_ORDER] += Z[scratch.FIRST_ORDER + k]
-            tile_totals[tile, TOTAL_MASS] += Z[scratch.SUM_MASS + k]
-            tile_totals[tile, TOTAL_MOMENTUM_X] += Z[scratch.SUM_X + k]
-            tile_totals[tile, TOTAL_MOMENTUM_Y] += Z[scratch.SUM_Y + k]
-            tile_totals[tile, TOTAL_ENERGY] += Z[scratch.SUM_ENERGY + k]
-            tile_totals[tile, VOIDED] += Z[scratch.SUM_VOIDED + k]
-            tile_totals[tile, EMPTIED] += Z[scratch.SUM_EMPTIED + k]
-        tile_totals[tile, LEAST_C2] = least
+        sum_columns(Z, tile, tile_totals[number])
 
     @kernel(allocates=False)
     def advance(old, new, rim, dt, parameters, scratches, tiles, tile_totals):

@@ -25,6 +25,8 @@ THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinn
 THINNEST_FOLLOWED_PART = 0.5  # the same where the time step collapses in this block
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
+# of the size: a node so near to a face lies on it from outside; a film is cut long before
+TOUCHING_PART = 1e-6
 # of the way to the next node inwards: through a film it is no further in front of the other side
 MOST_FRONT_PART = 0.01
 SHARP_CORNER_SINE = 0.1  # of the angle of a corner below which it is crushed
@@ -47,6 +49,26 @@ def is_blunt_corner(outlines, node, face, square):
             length = measure_square(outlines.nodes, outlines.starts[beside]) ** 0.5
             return square > (SHARP_CORNER_SINE * length) ** 2
     return False
+
+
+@compiled_once
+def is_in_front(outlines, face, part, x, y, node_x, node_y):
+    """Is a point (x, y) in front of a face, or of the next one where a node's foot is between both?
+
+    part: of the face, at which the foot of the node (node_x, node_y) next to the point lies.
+    """
+    nodes = outlines.nodes
+    start = outlines.starts[face]
+    front = -find_depth(nodes, start, x, y)
+    beside = NO_FACE
+    if part <= 0.0:
+        beside = outlines.before[start]
+    elif part >= 1.0:
+        beside = outlines.after[start + 1]
+    if beside != NO_FACE:
+        front = max(front, -find_depth(nodes, outlines.starts[beside], x, y))
+    to_x, to_y = x - node_x, y - node_y
+    return front > MOST_FRONT_PART * (to_x * to_x + to_y * to_y) ** 0.5
 
 
 @kernel
@@ -80,8 +102,8 @@ def find_thinnest(outlines, inner, sizes, widest):
                 start = outlines.starts[a]
                 if outlines.bodies[start] != outlines.bodies[node]:
                     continue
-                _, away = project(nodes, start, x, y)
-                if away >= reach * reach:
+                part, away = project(nodes, start, x, y)
+                if away >= reach * reach or away < (TOUCHING_PART * size) ** 2:
                     continue
                 if is_blunt_corner(outlines, node, a, away):
                     continue
@@ -92,9 +114,7 @@ def find_thinnest(outlines, inner, sizes, widest):
                 if find_depth(nodes, start, x, y) < 0.0:
                     continue
                 # not two ends of one body that touch each other: the inside is in front then
-                to_x, to_y = inner[0, node] - x, inner[1, node] - y
-                front = -find_depth(nodes, start, inner[0, node], inner[1, node])
-                if front > MOST_FRONT_PART * (to_x * to_x + to_y * to_y) ** 0.5:
+                if is_in_front(outlines, a, part, inner[0, node], inner[1, node], x, y):
                     continue
                 thinnest = away**0.5 / size
                 reach = thinnest * size

@@ -69,7 +69,7 @@ def test_entries_get_the_types_they_were_compiled_for(monkeypatch):
         )  # fmt: skip
         for _ in range(4):
             flow.advance()
-    assert {"advance", "look", "prepare", "solve_link", "predict_sides"} <= seen
+    assert {"advance", "check_residual", "prepare", "solve_link", "predict_sides"} <= seen
 
 
 def test_a_limiting_rate_is_that_of_any_layout():

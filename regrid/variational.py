@@ -64,7 +64,7 @@ LINE_EDGE_X, LINE_EDGE_Y, NEAR_EDGE_X, NEAR_EDGE_Y, FAR_EDGE_X = range(5)
 AREA_ROWS = at.COSECANT_1  # of the assembly's scratch, which holds D here, corner by corner
 
 
-@kernel
+@kernel(allocates=False)
 def fill_variational_corner(a_rows, b_rows, area, active, volume, smoothness, orthogonality, out):
     """Terms of one corner of a row of cells from its edges a along i and b along j.
 
@@ -113,9 +113,13 @@ def fill_variational_corner(a_rows, b_rows, area, active, volume, smoothness, or
         out[at.AB_YY + col] = hessian.ab_yy + (mu_ab * by * ay - kappa_ab * bx * ax)
 
 
-@inlined
-def fill_variational_corners(active, smoothness, orthogonality, count, Z):
-    """Terms of the four corners of a row of cells; `active` (4, count)."""
+@kernel(allocates=False)
+def fill_variational_corners(i, cells, low, count, Z):
+    """Terms of the four corners of `count` cells from column `low` on in row i.
+
+    cells: as in `assemble_variational`.
+    """
+    _, active, smoothness, orthogonality = cells
     for col in range(count):
         areas, _ = prepare_corners(*at.take_scaled_edges(col, Z))
         for corner in range(4):
@@ -130,7 +134,7 @@ def fill_variational_corners(active, smoothness, orthogonality, count, Z):
             Z[at.LINE_X + shift : at.LINE_X + shift + 4 * CHUNK_SPAN],
             Z[side : side + 4 * CHUNK_SPAN],
             Z[area : area + count],
-            active[corner],
+            active[corner, i, low : low + count],
             Z[at.WEIGHT : at.WEIGHT + count],
             smoothness,
             orthogonality,
@@ -147,7 +151,7 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     positive.
     """
     along_i, along_j, blend_i, blend_j = sides
-    volume, active, smoothness, orthogonality = cells
+    volume = cells[0]
     ni = nodes.shape[1] - 1
     low = first - 1
     count = last - first + 1
@@ -162,8 +166,7 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
         at.begin_row(nodes, i, lines, low, count, Z)
         for col in range(count):
             Z[at.WEIGHT + col] = volume[i, low + col]
-        row_active = active[:, i, low : low + count]
-        fill_variational_corners(row_active, smoothness, orthogonality, count, Z)
+        fill_variational_corners(i, cells, low, count, Z)
         # gathered by cell, then by node
         at.fill_cell_blocks(count, here, Z)
         at.fill_line_blocks(count, here, Z)
@@ -197,7 +200,7 @@ def fill_row_of_edges(nodes, i, sides, Z):
             Z[NEAR_EDGE_Y + 2 * row, j] = inverse * (y[i + row, j + 1] - y[i + row, j])
 
 
-@kernel
+@kernel(allocates=False)
 def fill_variational_energy(nodes, sides, cells, energy, least, Z):
     """J and the least active D, one a row of cells, into energy (ni) and least (ni).
 

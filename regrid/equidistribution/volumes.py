@@ -366,21 +366,24 @@ def sweep_first(residual, edges, tau, work, start, stop):
 
 
 @inlined
-def add_next_rows(lines, factors, k):
-    """Backward substitution: add to lines k, of x, y and z, their factors times the next ones."""
-    for c in range(3):
-        row = lines[c, k]
-        next_row = lines[c, k + 1]
-        row_factors = factors[k]
-        for j in range(row.shape[0]):
+def add_next_rows(planes, factors, k, n):
+    """Backward substitution: add to n numbers of row k their factors times those of the next row.
+
+    planes: of x, y and z.
+    """
+    row_factors = factors[k]
+    for plane in planes:
+        row = plane[k]
+        next_row = plane[k + 1]
+        for j in range(n):
             row[j] += row_factors[j] * next_row[j]
 
 
 @inlined
-def sweep_along_j(plane, edges, scale, tau, upper):
-    """Solve `(C + tau L2) d = C d` in a plane (3, n2, n3), forward, then backward along j."""
-    n = plane.shape[1]
-    x, y, z = plane[0], plane[1], plane[2]
+def sweep_along_j(planes, edges, scale, tau, upper):
+    """Solve `(C + tau L2) d = C d` in the planes of x, y, z, forward, then backward along j."""
+    x, y, z = planes
+    n, m = x.shape
     for j in range(n):
         before = max(j - 1, 0)
         link = tau if j > 0 else 0.0
@@ -390,18 +393,18 @@ def sweep_along_j(plane, edges, scale, tau, upper):
         factors = (upper[before], upper[j])
         eliminate(lines, lines_before, line_edges, scale[j], 0.0, tau, link, factors)
     for j in range(n - 2, -1, -1):
-        add_next_rows(plane, upper, j)
+        add_next_rows(planes, upper, j, m)
 
 
 @inlined
-def transpose_lines(plane, edges, scale, turned):
-    """Transpose the lines along k of a plane (3, n2, n3), their scales and edges into `turned`."""
-    n = plane.shape[1]
-    m = plane.shape[2]
+def transpose_lines(planes, edges, scale, turned):
+    """Transpose lines along k of the planes of x, y, z, their scales and edges into `turned`."""
+    x, y, z = planes
+    n, m = x.shape
     for j in range(n):
-        row_x = plane[0, j]
-        row_y = plane[1, j]
-        row_z = plane[2, j]
+        row_x = x[j]
+        row_y = y[j]
+        row_z = z[j]
         scale_row = scale[j]
         edge_row = edges[j]
         for k in range(m):
@@ -426,7 +429,7 @@ def sweep_along_k(turned, n, m, tau):
         factors = (turned[SCALE_ROW, before, :n], scale_row)
         eliminate(lines, lines_before, line_edges, scale_row, 0.0, tau, link, factors)
     for k in range(m - 2, -1, -1):
-        add_next_rows(turned[:3, :, :n], turned[SCALE_ROW, :, :n], k)
+        add_next_rows((turned[0], turned[1], turned[2]), turned[SCALE_ROW], k, n)
 
 
 @kernel
@@ -435,12 +438,12 @@ def sweep_plane(residual, edges, tau, work, nodes, i, turned):
 
     turned (5, n3, n2 + 8): the lines along k, transposed so that all are solved together.
     """
-    plane = residual[:, i]
+    planes = (residual[0, i], residual[1, i], residual[2, i])
     scale = work[0, i]
     n = residual.shape[2]
     m = residual.shape[3]
-    sweep_along_j(plane, edges[1][i], scale, tau, work[1, i])
-    transpose_lines(plane, edges[2][i], scale, turned)
+    sweep_along_j(planes, edges[1][i], scale, tau, work[1, i])
+    transpose_lines(planes, edges[2][i], scale, turned)
     sweep_along_k(turned, n, m, tau)
     # added to the nodes
     for c in range(3):

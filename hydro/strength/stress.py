@@ -145,7 +145,8 @@ class Stress:
             arrays.shear, block.plan.flowing_spans, self.FIRST_FIELD, self.sides, block.rim.rows
         )
         transport.predict(block, half_dt)
-        make_predict_rates(block.geometry)(
+        predict_rates = make_predict_rates(block.geometry)
+        predict_rates(
             block.start,
             block.rim.rows,
             block.nodes,
@@ -154,7 +155,8 @@ class Stress:
             self.rates,
         )
         laws = self._find_laws(block, block.list_starts(), values)
-        make_predict_stress(block.geometry)(
+        predict_stress = make_predict_stress(block.geometry)
+        predict_stress(
             values, transport.slopes, self.rates, laws, half_dt, transport.centres, rows, arrays
         )
 
@@ -181,7 +183,8 @@ class Stress:
     def prepare(self, block: Any) -> None:
         """Phase 6, before the flow's update: stress on the faces inside."""
         transport = block.transport
-        make_fill_face_stress(block.geometry)(
+        fill_face_stress = make_fill_face_stress(block.geometry)
+        fill_face_stress(
             transport.slopes, transport.centres, block.nodes, block.nodes_new,
             (block.rows.start, block.rows.stop), self.arrays,
         )  # fmt: skip
@@ -190,7 +193,8 @@ class Stress:
         """Phase 6, after the fields have been carried: the new stress."""
         arrays = self.arrays
         rows = block.rows.start, block.rows.stop
-        make_measure_rates(block.geometry)(
+        measure_rates = make_measure_rates(block.geometry)
+        measure_rates(
             block.nodes, block.nodes_new, arrays.speed_i, arrays.speed_j, self.sides, rows,
             self.rates,
         )  # fmt: skip

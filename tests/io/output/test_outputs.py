@@ -47,7 +47,7 @@ REFUSED = [
     ("[regrid]\noptions = {famly = 'i'}", "has no option 'famly'; did you mean 'family'?"),
     ("[output]\ntimes = [0.1, 99.0]", "output.times has 99"),
     ('[output]\nfields = ["rhoo"]', "did you mean 'rho'?"),
-    ('[output]\ncolumns = ["none"]', "no installed package has a group of history columns 'none'"),
+    ('[output]\ncolumns = ["none"]', "there is no group of history columns 'none'"),
     (GAUGE + "moves = true", "gauge 'a' moves with the material, but at [99, 0.1] there is none"),
     (GAUGE + "count = 3", "a line needs its end `to`"),
     (GAUGE + 'fields = ["rho", "roh"]', "there is no field 'roh'; did you mean 'rho'?"),

@@ -284,7 +284,7 @@ class Sides:
             tied_seam.ends.append(node)
         for node in tied_seam.ends:
             node.is_tied = True
-        self._by_segment[id(seam)].is_tied = tied_seam.compute_displacement
+        self._by_segment[id(seam)].find_tied_displacement = tied_seam.compute_displacement
         self.tied_seams.append(tied_seam)
 
 

@@ -44,7 +44,7 @@ CASES = {
     "side i_max.*bond = -100000000.0": [make_bonded("bond = -1e8")],
     "bond = 'strong'": [make_bonded('bond = "strong"')],
     "friction = -0.2": [make_bonded("friction = -0.2")],
-    "i_max: wall segment: 'friction'": [make_bonded("friction = 0.2", 'kind = "wall"')],
+    "i_max: wall segment: .* 'friction'": [make_bonded("friction = 0.2", 'kind = "wall"')],
     "weld = 'yes'": [make_bonded('weld = "yes"')],
     "piston segment: .* 'weld'": [make_bonded("weld = true", PISTON.format(300.0))],
     "side i_max.*void_fill: .* surface tension": GAS,

@@ -51,20 +51,6 @@ class Outlines(NamedTuple):
     boxes: np.ndarray
 
 
-@compiled_once
-def turns_inwards(outlines, node):
-    """Whether the body is wider than a straight angle at a node of its outline."""
-    before = outlines.before[node]
-    after = outlines.after[node]
-    if before == NO_FACE or after == NO_FACE:
-        return False
-    nodes = outlines.nodes
-    a, b = outlines.starts[before], outlines.starts[after]
-    dx, dy = nodes[0, a + 1] - nodes[0, a], nodes[1, a + 1] - nodes[1, a]
-    dx_next, dy_next = nodes[0, b + 1] - nodes[0, b], nodes[1, b + 1] - nodes[1, b]
-    return dx * dy_next - dy * dx_next < 0.0
-
-
 @kernel
 def fill_face_boxes(outlines):
     """Fill the boxes; returns the length of the longest face."""
@@ -107,6 +93,22 @@ def find_normal_at(outlines, node):
             y += y_face
     length = (x * x + y * y) ** 0.5
     return (x / length, y / length) if length > 0.0 else (0.0, 0.0)
+
+
+@compiled_once
+def lies_behind_node(outlines, node, x, y):
+    """Whether (x, y), to which a node of an outline is nearest, lies inside the body.
+
+    The mean of the normals beside the node tells: at an edge that sticks out all that is nearest to
+    it is in front, at one that is cut in all is behind, and on a straight line it is as for a face.
+    At the end of an outline nothing is inside.
+    """
+    if outlines.before[node] == NO_FACE or outlines.after[node] == NO_FACE:
+        return False
+    normal_x, normal_y = find_normal_at(outlines, node)
+    away_x = x - outlines.nodes[0, node]
+    away_y = y - outlines.nodes[1, node]
+    return away_x * normal_x + away_y * normal_y < 0.0
 
 
 @compiled_once
@@ -179,7 +181,9 @@ def find_face_behind(outlines, node, body, reach):
     if 0.0 < nearest_part < 1.0:
         is_inside = find_depth(nodes, nearest, x, y) > (-size if beside else 0.0)
     else:
-        is_inside = turns_inwards(outlines, nearest if nearest_part <= 0.0 else nearest + 1)
+        is_inside = lies_behind_node(
+            outlines, nearest if nearest_part <= 0.0 else nearest + 1, x, y
+        )
         is_inside = is_inside or (beside and least < size * size)
     if not is_inside or not (beside or least > size * size):
         return NO_FACE, 0.0, 0.0

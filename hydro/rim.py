@@ -124,6 +124,8 @@ def make_rim(faces: int, carried: int = 0) -> Rim:
     The ghosts beyond have lengths before they are filled.
     """
     rows = np.zeros((ROWS + CARRIED_ROWS * carried, faces))
+    # what comes in from beyond an open side is not withheld
+    rows[PART_BEYOND] = 1.0
     rows[LENGTH_GHOST] = 1.0
     return Rim(rows)
 

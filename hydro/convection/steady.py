@@ -101,8 +101,8 @@ def slip(equations: Equations, side: str) -> float | None:
 
 def wall_values(
     equations: Equations, side: str, heat: np.ndarray, diffusivity: float, k: int
-) -> np.ndarray | float | None:
-    """Temperature of a wall at the points of `heat` along it; None for a periodic axis."""
+) -> np.ndarray | float:
+    """Temperature of a wall at the points of `heat` along it; 0 for a periodic axis."""
     axis = equations.axes[k]
     cross = equations.axes[1 - k]
     if axis.periodic:

@@ -176,6 +176,18 @@ def test_boundary_kind_gives_the_speed_of_a_rarefaction(add):
     assert tube.cell_fields["p"][90:, :] == pytest.approx(0.8, rel=0.01)
 
 
+def test_boundary_kind_lets_material_flow_back_in(add):
+    """A higher pressure outside drives in what a piston's shock of that pressure would."""
+    add("pressure_outlet.py")
+    outlet = {"pressure": 1.2}
+    tube = make_tube(IdealGas(1.4), 1.0, 100, 1.4, 1.0, i_max=("pressure-outlet", outlet))
+    run_block(tube, 0.5)
+    theory = -0.2 / np.sqrt(1.4 * (1.2 * 1.2 + 0.2 * 1.0))  # speed behind a shock to p = 1.2
+    assert tube.cell_fields["u"][80:98, :] == pytest.approx(theory, rel=0.02)
+    # it is as dense as behind the shock, not emptied
+    assert tube.cell_fields["rho"][80:98, :].min() > 1.4 * 1.1
+
+
 def test_history_column_is_the_energy_of_the_shocked_gas(add):
     add("kinetic_energy.py")
     piston = {"velocity": (1.0, 0.0)}

@@ -13,7 +13,11 @@ import toy_problem
 
 from builders import ROOT
 
-BACKENDS = ["module://matplotlib_inline.backend_inline", "nonsense", "module://no.such"]
+BACKENDS = [
+    "module://matplotlib_inline.backend_inline",
+    pytest.param("nonsense", marks=pytest.mark.slow),
+    pytest.param("module://no.such", marks=pytest.mark.slow),
+]
 
 
 @pytest.fixture

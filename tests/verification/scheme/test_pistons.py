@@ -269,7 +269,10 @@ def test_stays_plane(pair, sides):
         assert np.ptp(block.nodes[0], axis=1).max() <= 1e-12
 
 
-@pytest.mark.parametrize("limiter", ["monotonised-central", "van-leer", "low-mach"])
+@pytest.mark.parametrize(
+    "limiter",
+    ["monotonised-central", "van-leer", pytest.param("low-mach", marks=pytest.mark.slow)],
+)
 @pytest.mark.parametrize("speed", [2300.0, 2600.0])
 def test_a_phase_transition_splits_a_shock_into_two(speed, limiter):
     """Graphite to diamond: the first shock is that of the onset, at 25 GPa, whatever is behind it.

@@ -210,8 +210,12 @@ def follow(simulation, by_mass=False):
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("flux", ["hllc", "hll"])
-@pytest.mark.parametrize("geometry", ["plane", "axisymmetric"])
+@pytest.mark.parametrize(
+    ("geometry", "flux"),
+    [("plane", "hllc"), ("axisymmetric", "hll"),
+     pytest.param("plane", "hll", marks=pytest.mark.slow),
+     pytest.param("axisymmetric", "hllc", marks=pytest.mark.slow)],
+)  # fmt: skip
 def test_emptied_cells_keep_what_they_have_in_both(geometry, flux):
     """Cells of fragments at one to three times the least density, also at a seam and an outflow."""
     simulation = make_flow(MATERIALS["metal"], geometry, rough=False, flux=flux)

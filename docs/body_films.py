@@ -108,13 +108,18 @@ FILMS = {
 
 
 def shrink(film: Path, target: Path) -> None:
-    """Write every second frame of a film, smaller and with few colours."""
+    """Write every second frame of a film, smaller and in one palette of few colours."""
     pictures = [frame.convert("RGB") for frame in ImageSequence.Iterator(Image.open(film))]
-    frames = []
+    small = []
     for picture in pictures[::2]:
         height = round(picture.height * WIDTH / picture.width)
-        small = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
-        frames.append(small.quantize(COLOURS, dither=Image.Dither.NONE))
+        small.append(picture.resize((WIDTH, height), Image.Resampling.LANCZOS))
+    # one palette for all, else the scale beside the picture changes from frame to frame
+    sheet = Image.new("RGB", (WIDTH, height * len(small)))
+    for number, picture in enumerate(small):
+        sheet.paste(picture, (0, number * height))
+    palette = sheet.quantize(COLOURS)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in small]
     frames[0].save(
         target, save_all=True, append_images=frames[1:], duration=FRAME_TIME, loop=0, optimize=True
     )

@@ -493,7 +493,6 @@ class Simulation:
         """Take up a state of `get_state` of the same blocks."""
         self.adopt_cells(state)
         self.clock.set_state(state)
-        self._measured = None
         self.ledger.set_state(state)
         self.meetings.set_state(state)
         self.motion.quality = None

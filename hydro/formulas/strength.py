@@ -27,12 +27,6 @@ def compute_hoop_stress(s_xx, s_yy):
 
 
 @inlined
-def compute_force(s_xx, s_yy, s_xy, area_x, area_y):
-    """Force (x, y) of a deviatoric stress on a face: s·n times its area."""
-    return s_xx * area_x + s_xy * area_y, s_xy * area_x + s_yy * area_y
-
-
-@inlined
 def resolve_stress(s_xx, s_yy, s_xy, nx, ny):
     """s_nn, s_tt and s_nt of a stress, along the unit normal and along the face."""
     s_nn = (nx * nx) * s_xx + (ny * ny) * s_yy + 2.0 * (nx * ny) * s_xy

@@ -12,7 +12,7 @@ import numpy as np
 from shockgrid.hydro.carried.fields import CarriedField
 from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture
 from shockgrid.hydro.formulas.reconstruction import FIRST_ORDER_LIMITER
-from shockgrid.hydro.mixture.sides import make_gather, make_trace_sides, place_ghosts
+from shockgrid.hydro.mixture.sides import make_gather, make_trace_sides, place_layers
 from shockgrid.hydro.mixture.slopes import (
     MARK_ROWS,
     MIXED_QUANTITIES,
@@ -73,7 +73,7 @@ class MixedCells:
 
     def predict(self, block: Any, half_dt: float) -> None:
         """Phase 2, after the couplings: slopes and values at mid-time."""
-        place_ghosts(self._list_start(block), self.lengths, block.rim.rows)
+        place_layers(self._list_start(block), self.lengths, block.rim.rows)
         self._fill_slopes(block, half_dt, block.kernels.is_first_order)
 
     def _fill_slopes(self, block: Any, half_dt: float, is_first_order: bool) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 
+from shockgrid.hydro.carried.transport import place_ghosts
 from shockgrid.hydro.eos.mixture import MASS_FRACTION, VOLUME_FRACTION
 from shockgrid.hydro.formulas.geometry import PLANE
 from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK
@@ -146,29 +147,16 @@ def make_gather(eos_class):
     return gather
 
 
-@compiled_once(allocates=False)
-def place_row(rim, row, field):
-    """Write a row of the rim into the layer around a field (ni + 2, nj + 2)."""
-    ni = field.shape[0] - 2
-    nj = field.shape[1] - 2
-    for k in range(nj):
-        field[0, k + 1] = rim[row, k]
-        field[ni + 1, k + 1] = rim[row, nj + k]
-    for k in range(ni):
-        field[k + 1, 0] = rim[row, 2 * nj + k]
-        field[k + 1, nj + 1] = rim[row, 2 * nj + ni + k]
-
-
 @kernel(allocates=False)
-def place_ghosts(held, lengths, rim):
+def place_layers(held, lengths, rim):
     """Write what lies beyond the sides into the layers around states, fractions and lengths."""
     state, carried = held
     for q in range(STATE_ROWS):
-        place_row(rim, RHO_GHOST + q, state[q])
+        place_ghosts(rim, RHO_GHOST + q, state[q])
     for q in range(carried.shape[0]):
-        place_row(rim, find_field_row(q, CARRIED_GHOST), carried[q])
-    place_row(rim, LENGTH_GHOST, lengths[0])
-    place_row(rim, LENGTH_GHOST, lengths[1])
+        place_ghosts(rim, find_field_row(q, CARRIED_GHOST), carried[q])
+    place_ghosts(rim, LENGTH_GHOST, lengths[0])
+    place_ghosts(rim, LENGTH_GHOST, lengths[1])
 
 
 @inlined

@@ -41,6 +41,7 @@ USUAL_CONSTANT = 0.29  # C of [Piriz2008]
 ARRESTS_UNTIL_END = 2.5  # the run lasts so many times the estimate of the time to the arrest
 DRAWN_PARTS = (0.1, 0.25, 1.0)  # of the run
 DRAWN_DEPTH = 0.6  # of a wavelength, below the crest
+DRAWN_MARGIN = 0.05  # of a wavelength, beyond it
 AFTER_PASSAGE_PART = 0.05  # of a wavelength that the shock would go on before growth is counted
 
 
@@ -225,16 +226,18 @@ class RippledSurface(Problem):
 
     def draw_rippled_surface(self, figure, run_data) -> None:
         """Plastic strain below the surface at three times, and the amplitude over time."""
-        *maps, curve = make_panels(figure, 12.0, 3.4, 1, 4, width_ratios=(1, 1, 1, 1.3))
+        *maps, curve = make_panels(figure, 13.0, 3.4, 1, 4, width_ratios=(1, 1, 1, 1.3))
         last = run_data.dumps[-1]
         strained = "plastic_strain" in last.blocks[0].cell_fields
         name = "plastic_strain" if strained else "p"
         colours = Colours(low=0.0, high=float(last.blocks[0].cell_fields[name].max()))
         for axis, part in zip(maps, DRAWN_PARTS, strict=True):
             dump = find_dump(run_data, part * last.t)
-            draw_field(axis, dump, name, colours, every=1, title="t", mm=True)
-            surface = 1e3 * float(dump.blocks[0].nodes[0, -1].max())
-            axis.set_xlim(surface - 1e3 * DRAWN_DEPTH * self.deck.wavelength, surface)
+            bar = name.replace("_", " ") if part == DRAWN_PARTS[-1] else ""
+            draw_field(axis, dump, name, colours, every=1, bar=bar, title="t", mm=True)
+            crest = 1e3 * float(dump.blocks[0].nodes[0, -1].max())
+            wavelength = 1e3 * self.deck.wavelength
+            axis.set_xlim(crest - DRAWN_DEPTH * wavelength, crest + DRAWN_MARGIN * wavelength)
         history = run_data.history
         curve.plot(1e6 * history["t"], 1e6 * history["amplitude"], lw=1.4)
         curve.set(xlabel="t [µs]", ylabel="amplitude [µm]")

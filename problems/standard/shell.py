@@ -163,14 +163,18 @@ class CollapsingShell(RadialProblem):
 
     def draw_shell(self, figure, run_data) -> None:
         """Plastic strain and grid at the start, half way and at the end; both radii over time."""
-        left, right = make_panels(figure, 11.0, 4.8, 1, 2)
+        *sections, right = make_panels(figure, 15.0, 4.0, 1, 4, width_ratios=(1, 1, 1, 1.3))
         dumps = run_data.dumps
         most = float(dumps[-1].blocks[0].cell_fields["plastic_strain"].max())
         colours = Colours(low=0.0, high=most)
-        for part in DRAWN_PARTS:
+        outermost = 1.02 * self.deck.outer / ONE_MILLIMETRE
+        for section, part in zip(sections, DRAWN_PARTS, strict=True):
             dump = find_dump(run_data, part * dumps[-1].t)
             bar = "plastic strain" if part == DRAWN_PARTS[-1] else ""
-            draw_field(left, dump, "plastic_strain", colours, every=4, bar=bar, mm=True)
+            draw_field(
+                section, dump, "plastic_strain", colours, every=4, bar=bar, title="t", mm=True
+            )
+            section.set(xlim=(0.0, outermost), ylim=(0.0, outermost))
         history = run_data.history
         times, radii = self.shell.follow(self.speed)
         for name in ("inner_radius", "outer_radius"):

@@ -340,8 +340,7 @@ class Simulation:
         places = refining.choose(self.step, self.motion.sides.lines)
         if places is None:
             return
-        # the blocks and all that is made with them, to be kept where no new grid is found
-        kept = {name: getattr(self, name) for name in REBUILT_PARTS}
+        kept = self._keep_parts()
         # the new blocks are made by the problem, from states; their grids then come from `lay`
         old = self._blocks
         inside = [block.state[:, 1:-1, 1:-1][..., places[:-1].astype(int)] for block in old]
@@ -349,8 +348,7 @@ class Simulation:
         try:
             laid_blocks = refining.lay(places, old, self.motion, self.t)
         except RunFailure:
-            for name, kept_part in kept.items():
-                setattr(self, name, kept_part)
+            self._put_back(kept)
             return
         for block, (nodes, held) in zip(self._blocks, laid_blocks, strict=True):
             block.nodes[...] = block.nodes_new[...] = nodes
@@ -359,6 +357,14 @@ class Simulation:
         self.motion.counts = kept["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
+
+    def _keep_parts(self) -> dict[str, Any]:
+        """The blocks and all that is made with them, to be put back where no new ones are found."""
+        return {name: getattr(self, name) for name in REBUILT_PARTS}
+
+    def _put_back(self, kept: dict[str, Any]) -> None:
+        for name, part in kept.items():
+            setattr(self, name, part)
 
     def _lay_cells(self, refining: Refining, count: int, states: list) -> None:
         """Rebuild the blocks with so many columns, on grids sampled from the first ones."""
@@ -377,9 +383,16 @@ class Simulation:
         Raises RunFailure where no grid is found for it, and nothing has changed.
         """
         assert self.handover is not None
-        counts = self.motion.counts
-        self._join_blocks(*self.handover.merge(self._blocks))
-        self.motion.counts = counts  # of the step that is over
+        kept = self._keep_parts()
+        line_rule = self._line_rule
+        try:
+            self._join_blocks(*self.handover.merge(self._blocks))
+        except (BadInput, RunFailure):
+            self._put_back(kept)
+            self._line_rule = line_rule
+            self.handover.first_nodes = None
+            raise
+        self.motion.counts = kept["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
 

@@ -615,9 +615,8 @@ class SmallCells:
         """Redistribute the new states of cells above `rate`, for which `dt` is stable."""
         self.changed = 0
         for redistribution in self.redistributions:
-            redistribution.block.redistributed_cells = (
-                0  # from the last step, or from this one before a retry
-            )
+            # what is there is of the last step, or of this one before a retry
+            redistribution.block.redistributed_cells = 0
         if self.fastest.rate <= rate * RATE_MARGIN:
             return
         limit = rate * RATE_MARGIN

@@ -92,7 +92,7 @@ def read_docstring(name: str) -> str:
     """The docstring of a problem's module, read without importing it; "" where it is missing."""
     if is_problem_file(name):
         return read_head(name)
-    place = OWN[name] if name in OWN else INSTALLED.find(name).value
+    place = INNER.get(name) or OWN.get(name) or INSTALLED.find(name).value
     try:
         spec = importlib.util.find_spec(place.partition(":")[0])
     except Exception:  # a package above the module cannot be imported

@@ -56,11 +56,12 @@ def is_mirrored_end(nodes, position):
 class Pins(NamedTuple):
     """What is known of the n + 1 nodes of one line of a pair, and where they lie on the other.
 
-    positions: of those that lie on it (pins), -1.0 for all others; found: the same on lines of a
-    later time; hits: where nodes have come through it in this step, else -1.0.  covered: lies it
-    between pins, on one face of the other line?  Of closed facets: held: the contact lays it on the
-    other line; inside: it is between two of them; stops: one ends there, counted along the leader.
-    counts: does it count, or have both lines this node?  part: see `may_lie_on`.
+    positions: of those that lie on it (pins), -1.0 for all others; later_positions: the same on
+    lines of a later time; hit_positions: where nodes have come through it in this step, else -1.0.
+    covered: whether it lies between pins, on one face of the other line.  Of closed facets: held:
+    the contact lays it on the other line; inside: it is between two of them; ends_facet: one ends
+    there, counted along the leader.  counts: whether it counts, False where both lines have this
+    node.  line_part: see `may_lie_on`.
     """
 
     positions: np.ndarray

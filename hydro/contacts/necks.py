@@ -16,9 +16,8 @@ from shockgrid.hydro.contacts.parting import (
     Bodies,
     fill_face_boxes,
     find_normal_at,
-    find_unit_normal,
 )
-from shockgrid.hydro.facets.lines import measure_square, project
+from shockgrid.hydro.facets.lines import compute_normal, measure_square, project
 from shockgrid.regrid.jit import compiled_once, kernel
 
 THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinner necks are cut
@@ -108,7 +107,7 @@ def find_thinnest(outlines, inner, sizes, widest):
                 if is_blunt_corner(outlines, node, a, away):
                     continue
                 # that look the other way, with the body between
-                face_x, face_y = find_unit_normal(nodes, start)
+                face_x, face_y = compute_normal(nodes, start, 1.0)
                 if normal_x * face_x + normal_y * face_y >= 0.0:
                     continue
                 if find_depth(nodes, start, x, y) < 0.0:

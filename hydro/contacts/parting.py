@@ -15,7 +15,7 @@ import numpy as np
 
 from shockgrid.hydro.contacts.facets import faces_each_other, find_depth, lies_away
 from shockgrid.hydro.contacts.surface import Surface
-from shockgrid.hydro.facets.lines import measure_square, project
+from shockgrid.hydro.facets.lines import compute_normal, measure_square, project
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
@@ -74,21 +74,13 @@ def fill_face_boxes(outlines):
 
 
 @compiled_once
-def find_unit_normal(nodes, start):
-    """Unit normal of the face from a node on, outwards."""
-    dx, dy = nodes[0, start + 1] - nodes[0, start], nodes[1, start + 1] - nodes[1, start]
-    length = (dx * dx + dy * dy) ** 0.5
-    return dy / length, -dx / length
-
-
-@compiled_once
 def find_normal_at(outlines, node):
     """Mean of the outward normals of the faces beside a node."""
     x = 0.0
     y = 0.0
     for face in (outlines.before[node], outlines.after[node]):
         if face != NO_FACE:
-            x_face, y_face = find_unit_normal(outlines.nodes, outlines.starts[face])
+            x_face, y_face = compute_normal(outlines.nodes, outlines.starts[face], 1.0)
             x += x_face
             y += y_face
     length = (x * x + y * y) ** 0.5
@@ -164,7 +156,7 @@ def find_face_behind(outlines, node, body, reach):
                 nearest = start
                 nearest_part = fraction
             # the way against the node's normal, for faces that look at it
-            face_x, face_y = find_unit_normal(nodes, start)
+            face_x, face_y = compute_normal(nodes, start, 1.0)
             facing = -(normal_x * face_x + normal_y * face_y)
             if facing > LEAST_FACING and find_depth(nodes, start, x, y) > 0.0:
                 distance = distance_square**0.5 / facing
@@ -289,6 +281,7 @@ class Bodies:
         """Let lines of a body go on where they end at one node; ends that others hold rest."""
         outlines = self.outlines
         known: dict[int, int] = {}
+        positions = np.concatenate([surface.line for surface in self.surfaces] or [[]], axis=-1)
         self.ends: dict[int, KeyNode] = {}
         for surface, span in zip(self.surfaces, self.spans, strict=True):
             for key_node, node in zip(surface.ends, (span.start, span.stop - 1), strict=True):
@@ -298,6 +291,9 @@ class Bodies:
                 twin = known.setdefault(id(key_node), node)
                 if twin == node:
                     self.ends[node] = key_node
+                    continue
+                if not np.array_equal(positions[:, node], positions[:, twin]):
+                    outlines.weights[[node, twin]] = 0.0  # its image, a period away
                     continue
                 outlines.twins[[node, twin]] = twin, node
                 for faces in (outlines.before, outlines.after):
@@ -319,6 +315,8 @@ class Bodies:
 
         longest_way [m]: no node goes further: a jump in a short step would crush its cells.
         """
+        if self.numbers.size < 2:
+            return 0
         outlines = self.outlines
         for surface, span in zip(self.surfaces, self.spans, strict=True):
             surface.read_new()

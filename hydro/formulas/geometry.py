@@ -154,7 +154,7 @@ def weigh_differences(length_before, shift_before, length, shift, length_after, 
 
 @inlined
 def move_velocity(u, v, u_x, u_y, v_x, v_y, offset_x, offset_y):
-    """Velocity in the middle of a cell, displaced by `way` from the centre, where it is (u, v)."""
+    """Velocity in the middle of a cell, off its centre, where it is (u, v)."""
     return u + (u_x * offset_x + u_y * offset_y), v + (v_x * offset_x + v_y * offset_y)
 
 

@@ -44,14 +44,12 @@ class MixedCells:
     """What a block of two materials needs in its steps; made by the block.
 
     eos: its equation of state; limiter, flux: those of the block; shape: its cells (ni, nj).
-    sharp: whether contacts are kept within three cells; True at first.
     """
 
     def __init__(self, eos: Mixture, limiter: str, flux: str, shape: tuple[int, int]):
         ni, nj = shape
         self.limiter = limiter
         self.flux = flux
-        self.sharp = True
         self.eos_class = type(eos)
         self.laws = eos.first.wave_law, eos.second.wave_law
         self.lengths = np.ones((ni + 2, nj + 2)), np.ones((ni + 2, nj + 2))
@@ -98,7 +96,7 @@ class MixedCells:
         if dt == 0.0:  # rates and totals alone, before anything is known of the sides
             fill_lengths(block.nodes, self.lengths)
             self._fill_slopes(block, 0.0, is_first_order=True)
-        update_mixed = make_mixed_update(self.eos_class, self.limiter, self.sharp)
+        update_mixed = make_mixed_update(self.eos_class, self.limiter)
         block.totals.start_update()
         update_mixed(
             self._list_cells(block), (block.state_new, block.carried_new), block.rim.rows, dt,

@@ -125,10 +125,10 @@ def make_exchange(eos_class):
 
 
 @functools.cache
-def make_mixed_update(eos_class, limiter: str, sharp: bool):
+def make_mixed_update(eos_class, limiter: str):
     """Kernel that updates a block of two materials.
 
-    Of a class of mixtures and a limiter; sharp: whether contacts are kept sharp.
+    Of a class of mixtures and a limiter.
     """
     trace = make_trace(eos_class)
     exchange = make_exchange(eos_class)
@@ -232,7 +232,7 @@ def make_mixed_update(eos_class, limiter: str, sharp: bool):
                 marks[ACOUSTIC_PART, cell_after[0], cell_after[1]],
             )
         flux = compute_flux(left, right, (area_x, area_y, sweep), hll, weight)
-        if sharp and hll == 0.0 and dt > 0.0:
+        if hll == 0.0 and dt > 0.0:
             step_i = cell_after[0] - cell_before[0]
             step_j = cell_after[1] - cell_before[1]
             from_one = flux[VOLUME_FLUX] > 0.0

@@ -97,12 +97,11 @@ class TiedSeam:
     """A seam between two contacts (leading segments), each its whole side.
 
     Every node of the seam goes with the two points of the contacts that it had beside it at first,
-    on the line through it from the middle of `one` to the middle of `other`, by its distances from
-    them.  Raises BadInput where there are no such points.
+    on the line through it from the middle of `contact` to that of `other_contact`, by its
+    distances from them.  Raises BadInput where there are no such points.
     """
 
     def __init__(self, seam: Segment, contact: Segment, other_contact: Segment):
-        self.seam = seam
         self.contacts = (contact, other_contact)
         seam_nodes, contact_nodes, other_nodes = (
             segment.line(segment.block.nodes) for segment in (seam, contact, other_contact)

@@ -45,9 +45,8 @@ class KeyNode:
         self.constraining_faces: list[tuple[Block, int]] = []
         self.is_tied = False  # an end of a carried seam, which moves it
         self.on_piston = False  # a moving line ends on a straight piston and slides along it
-        self.corner_sine = (
-            STRAIGHT_LINE_SINE  # sine of the angle from which two lines that hold the node are two
-        )
+        # sine of the angle from which two lines that hold the node are two
+        self.corner_sine = STRAIGHT_LINE_SINE
         # curved tracks that hold the node; with a moving line's mirrors, and which end it has here
         self.tracks: list[tuple[Track, list | None, int]] = []
 

@@ -365,7 +365,7 @@ def fill_speeds(nodes, faces, closed, walls, thickness_cubed, dt, out):
 def damp_node(line, node, speed, bend_angle, largest_rate):
     """The velocity that lets the shortest waves decay at node `node` of a line (2, n).
 
-    speed: strength times V [m/s]; bend [rad], most [1/s]: see `fill_sliding_damping`.
+    speed: strength times V [m/s]; bend_angle [rad], largest_rate [1/s]: see `fill_sliding_damping`.
     """
     # direction of the line and its fourth difference
     tx = line[0, node + 1] - line[0, node - 1]
@@ -404,9 +404,9 @@ def fill_sliding_damping(line, rim, start, strength, bend_angle, largest_rate, o
 
     with V = slip + speed of the contact relative to the line's mean.  Where materials slip, waves
     of many nodes still roll up into kinks that no cell beside the line can follow: the strength
-    grows by 1 + (turn / bend)² with the turn of the line at the node [rad], so that what is bent
-    sharper than `bend_angle` a node is taken back.
-    line (2, n + 4): the nodes with two images beyond each end; most: largest rate [1/s].
+    grows by 1 + (turn / bend_angle)² with the turn of the line at the node [rad], so that what is
+    bent sharper than `bend_angle` a node is taken back.
+    line (2, n + 4): the nodes with two images beyond each end; largest_rate [1/s].
     """
     count = out.shape[1]
     # the line's mean velocity

@@ -172,9 +172,9 @@ class Ranks(Blocks):
         return self.comm.bcast(failure if first == self.rank else None, root=first)
 
     def exchange_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
-        rows_of_blocks = self._exchange(self._nodes, rows, number, failure)
-        if rows_of_blocks is not None:
-            raise rows_of_blocks
+        first_failure = self._exchange(self._nodes, rows, number, failure)
+        if first_failure is not None:
+            raise first_failure
         for cut in self.cuts.values():
             cut.send_nodes()
         return self._nodes.get_rows()
@@ -182,9 +182,9 @@ class Ranks(Blocks):
     def exchange_new_states(
         self, rows: Sequence[Row], number: int, failure: RunFailure | None
     ) -> Table:
-        rows_of_blocks = self._exchange(self._new_states, rows, number, failure)
-        if rows_of_blocks is not None:
-            raise rows_of_blocks
+        first_failure = self._exchange(self._new_states, rows, number, failure)
+        if first_failure is not None:
+            raise first_failure
         self._take_sums()
         for cut in self.cuts.values():
             cut.exchange_ghost_rows()

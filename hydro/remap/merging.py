@@ -128,5 +128,6 @@ class Handover:
     def _assemble(
         self, nodes: np.ndarray, held: dict[str, Any]
     ) -> tuple[list[Block], list, Callable[[], object]]:
+        assembled = self.assemble(nodes, held)
         self.first_nodes = nodes.copy()
-        return self.assemble(nodes, held)
+        return assembled

@@ -10,8 +10,11 @@ from __future__ import annotations
 import functools
 
 from shockgrid.hydro.carried.transport import (
+    AT_CENTRE,
     LENGTH_I,
     LENGTH_J,
+    SLOPE_X,
+    SLOPE_Y,
     find_value,
     make_difference_weights,
     place_ghosts,
@@ -42,8 +45,6 @@ RATE_XX, RATE_YY, RATE_XY, SPIN, EQUIVALENT = range(5)
 RATE_ROWS = 5
 # carried fields of a solid, in their order
 S_XX, S_YY, S_XY, PLASTIC_STRAIN = range(4)
-# parts of `slopes` of a field, of `hydro.carried.transport`
-AT_CENTRE, SLOPE_X, SLOPE_Y = range(3)
 
 
 @inlined

@@ -25,6 +25,7 @@ from shockgrid.hydro.eos.conversion import (
     has_voids,
     open_voids,
 )
+from shockgrid.hydro.eos.materials import check_solid
 from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART, add_shear_wave
 from shockgrid.hydro.interior.solid import make_solid_arrays
 from shockgrid.hydro.rows import RHO, P
@@ -65,8 +66,10 @@ def strip_ghosts(held: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 def find_shorter_extent(nodes: np.ndarray) -> np.ndarray:
     """The shorter distance (ni, nj) [m] between the middles of opposite faces of cells."""
-    along_i = 0.5 * (np.diff(nodes, axis=1)[:, :, 1:] + np.diff(nodes, axis=1)[:, :, :-1])
-    along_j = 0.5 * (np.diff(nodes, axis=2)[:, 1:] + np.diff(nodes, axis=2)[:, :-1])
+    edges_i = np.diff(nodes, axis=1)
+    edges_j = np.diff(nodes, axis=2)
+    along_i = 0.5 * (edges_i[:, :, 1:] + edges_i[:, :, :-1])
+    along_j = 0.5 * (edges_j[:, 1:] + edges_j[:, :-1])
     return np.minimum(np.hypot(*along_i), np.hypot(*along_j))
 
 
@@ -78,8 +81,7 @@ def add_stress_fields(
     A field of the stress may be among those given, with first values of its own.  Raises BadInput
     for the equation of state of a gas, and one without a density at rest.
     """
-    if not getattr(eos, "opens_voids", True):
-        raise BadInput(f"block {block!r}: strength is for solids, and {eos.kind!r} is a gas")
+    check_solid(f"block {block!r}", eos)
     if getattr(eos, "rho0", None) is None:
         raise BadInput(
             f"block {block!r}: strength wants an equation of state with a density at rest, rho0; "
@@ -116,6 +118,7 @@ class Stress:
         self.law = law
         self.spall = spall
         self.broken_cells = 0
+        self._states_at_start: tuple = ()  # from the phase `start` to `predict`
         self.arrays = make_solid_arrays(ni, nj)
         self.rates = np.zeros((RATE_ROWS, ni, nj))
         self.sides = np.zeros((SIDE_ROWS, 2 * (ni + nj)))
@@ -123,7 +126,8 @@ class Stress:
     def start(self, block: Any) -> None:
         """Phase 2, when the cells along the sides are gathered: see `start_stress`."""
         held = block.list_starts()
-        shear = self._find_shear(block, held, block.get_start("carried"))
+        self._states_at_start = self._list_state(block, held)
+        shear = self._find_shear(self._states_at_start, block.get_start("carried"))
         torn = has_voids(held, slice(None), slice(None))
         self.arrays.shear[...] = np.where(torn, 0.0, shear)
         rho = held[0][RHO, 1:-1, 1:-1]
@@ -154,7 +158,7 @@ class Stress:
             rows,
             self.rates,
         )
-        laws = self._find_laws(block, block.list_starts(), values)
+        laws = self._find_laws(self._states_at_start, values)
         predict_stress = make_predict_stress(block.geometry)
         predict_stress(
             values, transport.slopes, self.rates, laws, half_dt, transport.centres, rows, arrays
@@ -199,8 +203,9 @@ class Stress:
             self.rates,
         )  # fmt: skip
         held = block.list_new()
-        laws = self._find_laws(block, held, block.carried_new)
-        shear = self._find_shear(block, held, block.carried_new)
+        states = self._list_state(block, held)
+        laws = self._find_laws(states, block.carried_new)
+        shear = self._find_shear(states, block.carried_new)
         plastic_strain = block.carried_new[self.FIRST_FIELD + PLASTIC_STRAIN, 1:-1, 1:-1]
         before = plastic_strain.copy() if self.spall is not None else plastic_strain
         update_stress(block.carried_new, self.rates, laws, shear, tuple(held), dt, rows)
@@ -235,7 +240,7 @@ class Stress:
             strained=strained[rows],
             strain_rate=self.rates[EQUIVALENT][rows],
             temperature=temperature,
-            extent=find_shorter_extent(block.nodes_new)[rows],
+            extent=find_shorter_extent(block.nodes_new[:, rows.start : rows.stop + 1]),
         )
         pressure = self.spall.relax(values, cells, dt)
         open_voids(eos, pressure, state, *others)
@@ -258,28 +263,30 @@ class Stress:
         inside = state[:, 1:-1, 1:-1]
         temperature = None
         if self.law.needs_temperature:
-            temperature = compute_temperature(block.eos, inside, *void_arrays)
+            with np.errstate(all="ignore"):
+                temperature = compute_temperature(block.eos, inside, *void_arrays)
         return inside[RHO], inside[P], temperature
 
-    def _find_shear(
-        self, block: Any, held: Sequence[np.ndarray], carried: np.ndarray
-    ) -> np.ndarray:
+    def _find_shear(self, states: tuple, carried: np.ndarray) -> np.ndarray:
         """Shear modulus (ni, nj) [Pa] of the law; no number where there is no state, and 0 in
-        broken cells."""
+        broken cells.
+
+        states: of `_list_state`.
+        """
         with np.errstate(all="ignore"):
-            shear = self.law.shear_modulus(*self._list_state(block, held))
+            shear = self.law.shear_modulus(*states)
         if self.spall is not None:
             broken = self.spall.find_broken(carried[self._find_spall_fields(), 1:-1, 1:-1])
             shear = np.where(broken, 0.0, shear)
         return np.ascontiguousarray(shear)
 
-    def _find_laws(
-        self, block: Any, held: Sequence[np.ndarray], carried: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Flow stress and hardening (ni, nj) [Pa] of the law, at the rates of `rates`."""
+    def _find_laws(self, states: tuple, carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Flow stress and hardening (ni, nj) [Pa] of the law, at the rates of `rates`.
+
+        states: of `_list_state`.
+        """
         strain = carried[self.FIRST_FIELD + PLASTIC_STRAIN, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
-            states = self._list_state(block, held)
             flow_stress = self.law.flow_stress(strain, self.rates[EQUIVALENT], *states)
             hardening = self.law.hardening(strain, self.rates[EQUIVALENT], *states)
         return np.ascontiguousarray(flow_stress), np.ascontiguousarray(hardening)

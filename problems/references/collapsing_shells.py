@@ -13,6 +13,7 @@ shell stands [HowellBall2002].
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -24,8 +25,13 @@ from shockgrid.regrid.roots import find_root
 QUADRATURE_POINTS = 64
 POWERS = {"cylindrical": 1, "spherical": 2}
 STRAINS = {"cylindrical": 2.0 / math.sqrt(3.0), "spherical": 2.0}
-GAUSS_PLACES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
 MOTION_POINTS = 4000
+
+
+@functools.cache
+def find_gauss_points() -> tuple[np.ndarray, np.ndarray]:
+    """Places from -1 to 1 and weights of the quadrature."""
+    return np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,11 @@ class PlasticShell:
         """Plastic work per radian [J/m], or per solid angle [J], until the radius `inner`."""
         n = self.power + 1
         half = 0.5 * (self.outer - self.inner)
-        start = self.inner + half * (1.0 + GAUSS_PLACES)
+        places, weights = find_gauss_points()
+        start = self.inner + half * (1.0 + places)
         now = (start**n - self.inner**n + inner**n) ** (1.0 / n)
         strain = STRAINS[self.geometry] * np.log(start / now)
-        return float(self.yield_stress * half * (GAUSS_WEIGHTS * strain * start**self.power).sum())
+        return float(self.yield_stress * half * (weights * strain * start**self.power).sum())
 
     def compute_inertia(self, inner: float) -> float:
         """The kinetic energy is this times (velocity * radius^d)² of the inner surface."""

@@ -103,11 +103,15 @@ class RippledSurface(Problem):
         return self.deck.depth * self.deck.wavelength
 
     @functools.cached_property
+    def last_shock(self):
+        """The last of the shocks that the piston sends."""
+        return compute_piston(self.solid, self.deck.speed)[-1]
+
+    @functools.cached_property
     def passage(self) -> tuple[float, float, float, float]:
         """The last shock's arrival at the surface [s], the surface's speed [m/s] then, and the
         times [s] at which head and tail of its release are back at the piston."""
-        waves = compute_piston(self.solid, self.deck.speed)
-        last = waves[-1]
+        last = self.last_shock
         release = compute_release(self.solid, last)
         arrival = self.length / last.shock_speed
         # mass between piston and surface, which the release crosses
@@ -122,7 +126,7 @@ class RippledSurface(Problem):
         if deck.start == "velocity":
             return deck.speed
         _, surface_speed, _, _ = self.passage
-        compression = 1.0 - deck.speed / compute_piston(self.solid, deck.speed)[-1].shock_speed
+        compression = 1.0 - deck.speed / self.last_shock.shock_speed
         return self.k * self.amplitude * compression * surface_speed
 
     def estimate_arrest(self, rate: float) -> float:

@@ -12,6 +12,7 @@ Note: beryllium is stiff, but not rigid: some 1 % of the energy goes into compre
 run to and fro through the shell.  The stop is the least radius of the inner surface.
 """
 
+import functools
 import math
 from typing import ClassVar, Literal
 
@@ -89,8 +90,13 @@ class CollapsingShell(RadialProblem):
             self.speed = deck.speed or self.shell.find_speed(deck.stop)
         self.stop = self.shell.find_stop(self.speed)
         deck.refuse(self.stop == 0.0, "speed", "so fast a shell reaches the centre")
-        times, _ = self.shell.follow(self.speed)
+        times, _ = self.motion
         self.t_end = deck.run.t_end or END_PART * float(times[-1])
+
+    @functools.cached_property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s] and inner radii [m] of the rigid shell."""
+        return self.shell.follow(self.speed)
 
     def make_grids(self, t=0.0):
         deck = self.deck
@@ -176,7 +182,7 @@ class CollapsingShell(RadialProblem):
             )
             section.set(xlim=(0.0, outermost), ylim=(0.0, outermost))
         history = run_data.history
-        times, radii = self.shell.follow(self.speed)
+        times, radii = self.motion
         for name in ("inner_radius", "outer_radius"):
             label = name.replace("_", " ")
             right.plot(1e6 * history["t"], history[name] / ONE_MILLIMETRE, lw=1.4, label=label)

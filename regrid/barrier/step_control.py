@@ -23,7 +23,6 @@ NO_LIMIT = 1e300
 NEW_ROWS, OLD_ROWS = (tuple((first + k) * CHUNK_SPAN for k in range(4)) for first in (0, 4))
 AREA_1, AREA_2, AREA_3, AREA_4, OLD_1, OLD_2, OLD_3, OLD_4 = (k * CHUNK_SPAN for k in range(8, 16))
 LEAST_RATIO, LEAST_AREA, NOT_A_NUMBER = (k * CHUNK_SPAN for k in range(16, 19))
-STEP_CONTROL_ROWS = 19 * CHUNK_SPAN
 
 FRACTION, FAILS = range(2)  # rows of a shortening: part of the step kept, last failing round
 MOST_NODE_HALVINGS = 8  # after this many, a node that still offends stays where it was

@@ -169,7 +169,7 @@ def read_restart_deck(
     say: Callable[[str], None] = lambda text: None,
 ) -> ReadDeck:
     """The deck that a restart marches with: that of `directory` with `settings`, checked against
-    the one in the restart point of step `at`, None the last (`kept_deck`)."""
+    the one in the restart point of step `at`, None the last (`settle_deck`)."""
     deck = read_run_deck(directory, settings, strict=True, say=say)
     check_changeable(settings, type(deck.deck))
     check_effect(settings, deck.deck)

@@ -18,6 +18,23 @@ import numpy as np
 from shockgrid.regrid.errors import BadInput
 
 
+def check_parameters(law: Any, subject: str) -> None:
+    """Raise BadInput for a parameter of a law that is no number, or none of its range.
+
+    subject: what the law is of.
+    """
+    for field in fields(law):
+        value = getattr(law, field.name)
+        name = law.keys.get(field.name, field.name)
+        where = f"{subject} law {law.kind!r}: {name} is {value!r}"
+        if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
+            raise BadInput(f"{where}; a number in SI units is wanted")
+        if field.name in law.positive and not value > 0.0:
+            raise BadInput(f"{where}; it must be positive")
+        if field.name in law.not_negative and not value >= 0.0:
+            raise BadInput(f"{where}; it must be 0 or more")
+
+
 @dataclass(frozen=True)
 class StrengthLaw:
     """Shear modulus and flow stress of a material.
@@ -42,20 +59,7 @@ class StrengthLaw:
     needs_temperature: ClassVar[bool] = False
 
     def __post_init__(self):
-        self.check_numbers()
-
-    def check_numbers(self) -> None:
-        """Raise BadInput for a parameter that is no number, or none of its range."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            name = self.keys.get(field.name, field.name)
-            where = f"strength law {self.kind!r}: {name} is {value!r}"
-            if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
-                raise BadInput(f"{where}; a number in SI units is wanted")
-            if field.name in self.positive and not value > 0.0:
-                raise BadInput(f"{where}; it must be positive")
-            if field.name in self.not_negative and not value >= 0.0:
-                raise BadInput(f"{where}; it must be 0 or more")
+        check_parameters(self, "strength")
 
     def shear_modulus(self, density, pressure, temperature) -> np.ndarray:
         """Shear modulus G [Pa], 0 or more."""
@@ -70,6 +74,18 @@ class StrengthLaw:
     def hardening(self, plastic_strain, strain_rate, density, pressure, temperature) -> np.ndarray:
         """Slope dY/d(plastic strain) [Pa] of the flow stress; here 0."""
         return np.zeros(np.shape(density))
+
+
+@dataclass(frozen=True)
+class ConstantModulus(StrengthLaw):
+    """A law with a constant shear modulus, `modulus` [Pa], in decks shear_modulus."""
+
+    modulus: float
+
+    keys = MappingProxyType({"modulus": "shear_modulus"})
+
+    def shear_modulus(self, density, pressure, temperature):
+        return np.full(np.shape(density), float(self.modulus))
 
 
 def make_law(

@@ -10,19 +10,38 @@ bound, and T* stays between 0 and 1: cold material is no harder, molten material
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import ConstantModulus
 from shockgrid.regrid.errors import BadInput
 
 # below it the slope of strain^n, which is infinite at 0 for n < 1, is that at this strain
 LEAST_HARDENING_STRAIN = 1e-5
 
 
+def check_melting(law: Any, subject: str) -> None:
+    """Raise BadInput where a law's melting temperature is not above its reference.
+
+    subject: what the law is of.
+    """
+    if not law.melting_temperature > law.reference_temperature:
+        raise BadInput(
+            f"{subject} law {law.kind!r}: melting_temperature is {law.melting_temperature:g} "
+            f"K; it must be above reference_temperature, {law.reference_temperature:g} K"
+        )
+
+
+def find_log_rate_and_hotness(law: Any, strain_rate, temperature) -> tuple[np.ndarray, np.ndarray]:
+    """ln(rate/reference_rate), 0 for slower ones, and T* from 0 to 1, with the law's numbers."""
+    faster = np.maximum(np.divide(strain_rate, law.reference_rate), 1.0)
+    span = law.melting_temperature - law.reference_temperature
+    return np.log(faster), np.clip((temperature - law.reference_temperature) / span, 0.0, 1.0)
+
+
 @dataclass(frozen=True)
-class JohnsonCook(StrengthLaw):
+class JohnsonCook(ConstantModulus):
     """Johnson–Cook law: `modulus`, in decks shear_modulus, `a` and `b` in Pa, `n`, `c` and `m`
     without unit, temperatures in K, `reference_rate` in 1/s.
 
@@ -30,7 +49,6 @@ class JohnsonCook(StrengthLaw):
     melting temperature that is not above the reference.
     """
 
-    modulus: float
     a: float
     b: float
     n: float
@@ -43,19 +61,11 @@ class JohnsonCook(StrengthLaw):
     kind = "johnson-cook"
     positive = ("modulus", "n", "m", "reference_temperature", "reference_rate")
     not_negative = ("a", "b", "c")
-    keys = MappingProxyType({"modulus": "shear_modulus"})
     needs_temperature = True
 
     def __post_init__(self):
         super().__post_init__()
-        if not self.melting_temperature > self.reference_temperature:
-            raise BadInput(
-                f"strength law {self.kind!r}: melting_temperature is {self.melting_temperature:g} "
-                f"K; it must be above reference_temperature, {self.reference_temperature:g} K"
-            )
-
-    def shear_modulus(self, density, pressure, temperature):
-        return np.full(np.shape(density), float(self.modulus))
+        check_melting(self, "strength")
 
     def flow_stress(self, plastic_strain, strain_rate, density, pressure, temperature):
         strain = np.maximum(plastic_strain, 0.0)
@@ -68,7 +78,5 @@ class JohnsonCook(StrengthLaw):
 
     def _scale(self, strain_rate, temperature) -> np.ndarray:
         """The factors of strain rate and temperature."""
-        faster = np.maximum(np.divide(strain_rate, self.reference_rate), 1.0)
-        span = self.melting_temperature - self.reference_temperature
-        hotness = np.clip((temperature - self.reference_temperature) / span, 0.0, 1.0)
-        return (1.0 + self.c * np.log(faster)) * (1.0 - hotness**self.m)
+        log_rate, hotness = find_log_rate_and_hotness(self, strain_rate, temperature)
+        return (1.0 + self.c * log_rate) * (1.0 - hotness**self.m)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
-from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import ConstantModulus
 
 
 @dataclass(frozen=True)
-class Perfect(StrengthLaw):
+class Perfect(ConstantModulus):
     """Elastic up to a constant flow stress, then perfectly plastic.
 
     `modulus`, in decks shear_modulus, and `yield_strength` in Pa.  A yield strength of 0 leaves a
@@ -19,16 +18,11 @@ class Perfect(StrengthLaw):
     negative yield strength.
     """
 
-    modulus: float
     yield_strength: float
 
     kind = "perfect"
     positive = ("modulus",)
     not_negative = ("yield_strength",)
-    keys = MappingProxyType({"modulus": "shear_modulus"})
-
-    def shear_modulus(self, density, pressure, temperature):
-        return np.full(np.shape(density), float(self.modulus))
 
     def flow_stress(self, plastic_strain, strain_rate, density, pressure, temperature):
         return np.full(np.shape(density), float(self.yield_strength))

@@ -12,11 +12,10 @@ gives the flow stress without thermal activation, that at T = 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
-from shockgrid.hydro.strength.laws.base import StrengthLaw
+from shockgrid.hydro.strength.laws.base import ConstantModulus
 
 LEAST_STRAIN_RATE = 1e-4  # [1/s]: of slow laboratory tests
 # below it slopes of powers of strain, infinite at 0, are those at this strain
@@ -31,11 +30,10 @@ def soften(temperature, strain_rate, at_unit_rate: float, by_rate: float) -> np.
 
 
 @dataclass(frozen=True)
-class ZerilliArmstrongFCC(StrengthLaw):
+class ZerilliArmstrongFCC(ConstantModulus):
     """Zerilli–Armstrong law of face-centred cubic metals: `modulus`, in decks shear_modulus, `c0`
     and `b` in Pa, `alpha0` and `alpha1` in 1/K.  Raises BadInput for numbers out of range."""
 
-    modulus: float
     c0: float
     b: float
     alpha0: float
@@ -44,11 +42,7 @@ class ZerilliArmstrongFCC(StrengthLaw):
     kind = "zerilli-armstrong-fcc"
     positive = ("modulus",)
     not_negative = ("c0", "b", "alpha0", "alpha1")
-    keys = MappingProxyType({"modulus": "shear_modulus"})
     needs_temperature = True
-
-    def shear_modulus(self, density, pressure, temperature):
-        return np.full(np.shape(density), float(self.modulus))
 
     def flow_stress(self, plastic_strain, strain_rate, density, pressure, temperature):
         softened = soften(temperature, strain_rate, self.alpha0, self.alpha1)
@@ -61,12 +55,11 @@ class ZerilliArmstrongFCC(StrengthLaw):
 
 
 @dataclass(frozen=True)
-class ZerilliArmstrongBCC(StrengthLaw):
+class ZerilliArmstrongBCC(ConstantModulus):
     """Zerilli–Armstrong law of body-centred cubic metals: `modulus`, in decks shear_modulus, `c0`,
     `b` and `k` in Pa, `beta0` and `beta1` in 1/K, `n`.  Raises BadInput for numbers out of range.
     """
 
-    modulus: float
     c0: float
     b: float
     beta0: float
@@ -77,11 +70,7 @@ class ZerilliArmstrongBCC(StrengthLaw):
     kind = "zerilli-armstrong-bcc"
     positive = ("modulus", "n")
     not_negative = ("c0", "b", "beta0", "beta1", "k")
-    keys = MappingProxyType({"modulus": "shear_modulus"})
     needs_temperature = True
-
-    def shear_modulus(self, density, pressure, temperature):
-        return np.full(np.shape(density), float(self.modulus))
 
     def flow_stress(self, plastic_strain, strain_rate, density, pressure, temperature):
         activated = self.b * soften(temperature, strain_rate, self.beta0, self.beta1)

@@ -1,6 +1,6 @@
 """Laws of spall by kind: how solids open under tension, and break.  A new one is a file and a line.
 
-May import: `regrid`, `hydro.carried`.
+May import: `regrid`, `hydro.carried`, `hydro.strength.laws`.
 """
 
 from shockgrid.hydro.strength.spall.base import SolidCells, SpallLaw

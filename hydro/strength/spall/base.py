@@ -12,15 +12,14 @@ the law.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from numbers import Real
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from shockgrid.hydro.carried.fields import CarriedField
-from shockgrid.regrid.errors import BadInput
+from shockgrid.hydro.strength.laws.base import check_parameters
 
 NO_EQUIVALENT_STRESS = 1e-300  # [Pa]: keeps 0/0 of a cell without stress from being a NaN
 
@@ -62,24 +61,20 @@ class SpallLaw:
     """How a solid opens under tension.
 
     Class attributes: `kind`, its name in decks; `positive`, parameters that must be greater than 0;
+    `not_negative`, 0 or more;
     `keys`, names of parameters in decks where they differ from the fields'; `fields`, what cells
     carry; `needs_temperature`.
     """
 
     kind: ClassVar[str]
     positive: ClassVar[tuple[str, ...]] = ()
+    not_negative: ClassVar[tuple[str, ...]] = ()
     fields: ClassVar[tuple[CarriedField, ...]] = ()
     keys: ClassVar[Mapping[str, str]] = MappingProxyType({})
     needs_temperature: ClassVar[bool] = False
 
     def __post_init__(self):
-        for field in fields(self):
-            value = getattr(self, field.name)
-            where = f"spall law {self.kind!r}: {field.name} is {value!r}"
-            if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
-                raise BadInput(f"{where}; a number in SI units is wanted")
-            if field.name in self.positive and not value > 0.0:
-                raise BadInput(f"{where}; it must be positive")
+        check_parameters(self, "spall")
 
     def relax(self, values: np.ndarray, cells: SolidCells, dt: float) -> np.ndarray:
         """Advance the fields `values` (n, ...) over `dt` [s] in place; returns pressures [Pa]."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shockgrid.hydro.carried.fields import CarriedField
+from shockgrid.hydro.strength.laws.johnson_cook import check_melting, find_log_rate_and_hotness
 from shockgrid.hydro.strength.spall.base import (
     NO_EQUIVALENT_STRESS,
     SpallLaw,
@@ -27,7 +28,8 @@ MOST_TRIAXIALITY = 10.0  # of sigma_m/J, either way: exp(d3 ...) stays a number
 @dataclass(frozen=True)
 class JohnsonCookDamage(SpallLaw):
     """`d1` to `d5` without unit, `melting_temperature` and `reference_temperature` in K,
-    `reference_rate` in 1/s.  Raises BadInput for temperatures and rates that are not positive."""
+    `reference_rate` in 1/s.  Raises BadInput for temperatures and rates that are not positive, and
+    for a melting temperature that is not above the reference."""
 
     d1: float
     d2: float
@@ -43,15 +45,17 @@ class JohnsonCookDamage(SpallLaw):
     fields = (CarriedField("damage", "1", "sum of plastic strain over strain at failure"),)
     needs_temperature = True
 
+    def __post_init__(self):
+        super().__post_init__()
+        check_melting(self, "spall")
+
     def find_failure_strain(self, pressure, equivalent_stress, strain_rate, temperature):
         """Plastic strain at failure of states, arrays of one shape, SI."""
         least = np.abs(pressure) / MOST_TRIAXIALITY + NO_EQUIVALENT_STRESS
         triaxiality = -pressure / np.maximum(equivalent_stress, least)
-        faster = np.maximum(strain_rate / self.reference_rate, 1.0)
-        span = self.melting_temperature - self.reference_temperature
-        hotness = np.clip((temperature - self.reference_temperature) / span, 0.0, 1.0)
+        log_rate, hotness = find_log_rate_and_hotness(self, strain_rate, temperature)
         strain = self.d1 + self.d2 * np.exp(self.d3 * triaxiality)
-        strain = strain * (1.0 + self.d4 * np.log(faster)) * (1.0 + self.d5 * hotness)
+        strain = strain * (1.0 + self.d4 * log_rate) * (1.0 + self.d5 * hotness)
         return np.maximum(strain, LEAST_FAILURE_STRAIN)
 
     def relax(self, values, cells, dt):

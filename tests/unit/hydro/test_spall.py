@@ -132,6 +132,8 @@ def test_johnson_cook_damage_is_strain_over_strain_at_failure():
 
 
 def test_what_makes_no_law_is_refused():
+    with pytest.raises(BadInput, match=r"spall law 'johnson-cook': melting_temperature is 200 K"):
+        JohnsonCookDamage(0.54, 4.89, -3.03, 0.014, 1.12, 200.0)
     with pytest.raises(BadInput, match=r"stress is -1\.0; it must be positive"):
         ConstantSpall(-1.0)
     with pytest.raises(BadInput, match="width is 'thin'; a number"):

@@ -6,6 +6,7 @@ import pytest
 from builders import box
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.errors import RegridFailure
+from shockgrid.regrid.given import take_sides
 from shockgrid.regrid.measure.corners import find_excluded_corners, find_folded_cells
 from shockgrid.regrid.sides import compute_area, get_sides
 
@@ -36,12 +37,6 @@ ORIENTATIONS = {
 def count_folded(nodes):
     upright = np.ascontiguousarray(nodes if compute_area(nodes) > 0.0 else nodes[::-1])
     return len(find_folded_cells(upright, find_excluded_corners(upright)))
-
-
-def take_sides(nodes):
-    boundary = nodes.copy()
-    boundary[:, 1:-1, 1:-1] = np.nan
-    return boundary
 
 
 @pytest.mark.parametrize("side", ORIENTATIONS)

@@ -64,6 +64,17 @@ def test_shocks_heat_by_walsh_and_christians_equation():
         assert eos.temperature(rho, e) == pytest.approx(found(eta)[0], rel=1e-7)
 
 
+def test_a_temperature_depends_on_its_own_cell_alone():
+    rho = COPPER.rho0 * np.linspace(0.4, 1.9, 301)
+    e = np.linspace(0.0, 1e6, 301)
+    together = COPPER.temperature(rho, e)
+    alone = np.array([float(COPPER.temperature(*cell)) for cell in zip(rho, e, strict=True)])
+    assert np.array_equal(together, alone)
+    # far beyond what can be compressed, in a state that a step has not found, there is none
+    strange = COPPER.temperature(np.array([1e30, np.nan, COPPER.rho0]), np.zeros(3))
+    assert np.isnan(strange[:2]).all() and strange[2] == REST_TEMPERATURE
+
+
 def test_blocks_have_the_field_where_their_material_has_a_heat_capacity():
     nodes = make_plane_grid(np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4))
     block = Block("metal", COPPER, nodes, COPPER.rho0, 0.0, 0.0, 0.0)

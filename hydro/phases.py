@@ -106,8 +106,6 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
     )  # fmt: skip
     if block.transport.count:
         block.transport.carry(block, dt)
-    if block.stress is not None:
-        block.stress.relax(block, dt)
     if block.is_follower and not block.is_cut:
         fill_polygons(block)
 
@@ -118,6 +116,22 @@ def fill_polygons(block: Block) -> None:
     block.kernels.sides.fill_polygons(
         _list_old(block), _list_new(block), excess, block.parameters, block.totals.rest
     )
+
+
+def relax(block: Block, dt: float) -> None:
+    """Of a solid, with the new state known: its new stress."""
+    assert block.stress is not None
+    block.stress.relax(block, dt)
+
+
+def open_voids(block: Block, dt: float) -> int:
+    """Last of all, by the law of spall of a solid; returns how many cells are broken.
+
+    What gives cells a pressure of their density and energy, such as polygons and redistribution,
+    knows nothing of the law.
+    """
+    assert block.stress is not None
+    return block.stress.spall_new_cells(block, dt)
 
 
 def _list_old(block: Block) -> tuple[Any, ...]:

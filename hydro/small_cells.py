@@ -45,6 +45,7 @@ from shockgrid.hydro.perimeter.faces import measure_lines, measure_volume
 from shockgrid.hydro.ranks.blocks import Blocks
 from shockgrid.hydro.ranks.cutting import Rows
 from shockgrid.hydro.rim import find_excess
+from shockgrid.hydro.strength.rates import PLASTIC_STRAIN
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.jit import compiled_once, kernel
 
@@ -421,6 +422,8 @@ def make_redistribution(eos_class, geometry: Geometry):
             is_voided, c2 = write_cell(held, i, j, rho, u, v, total[3] / rho, parameters)
             for q in range(carried.shape[0]):
                 carried[q, i + 1, j + 1] = total[FLOW_QUANTITIES + q] / rho
+            if is_solid and is_voided:  # what is torn bears nothing
+                carried[:PLASTIC_STRAIN, i + 1, j + 1] = 0.0
             voided += 1 if is_voided else 0
             c2 = c2 if (rho > 0.0) & (c2 > 0.0) else -1.0
             least_c2 = min(least_c2, c2)

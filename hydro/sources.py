@@ -50,7 +50,8 @@ class BodySource:
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
             block.copy_start()
-            push, gained = self._apply(block, block.list_starts(), t, 0.5 * dt)
+            held = block.list_starts()
+            push, gained = self._apply(block, held, block.get_start("carried"), t, 0.5 * dt)
             pushes.append(block.gather_perimeter(push))
             gains.append((*gained, push.any()))
         pushes = self.blocks.exchange_starts(pushes)
@@ -66,7 +67,7 @@ class BodySource:
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
             held = [getattr(block, name) for name in HELD_ARRAYS]
-            _, gained = self._apply(block, held, t + 0.5 * dt, 0.5 * dt)
+            _, gained = self._apply(block, held, block.carried, t + 0.5 * dt, 0.5 * dt)
             block.totals.add_source(gained, block.is_follower)
             gains.append(gained)
         for gained in self.blocks.exchange_rows(gains, 3):
@@ -74,9 +75,11 @@ class BodySource:
         self.blocks.exchange_states()
 
     def _apply(
-        self, block: Block, held: list[np.ndarray], t: float, dt: float
+        self, block: Block, held: list[np.ndarray], carried: np.ndarray, t: float, dt: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Add the source over dt to the arrays `held` of a block, in the order of HELD_ARRAYS.
+
+        carried: its fields with ghosts, which a law of spall advances.
 
         Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
@@ -94,4 +97,7 @@ class BodySource:
         v += dv
         if np.any(heat):
             add_heat(block.eos, heat, inside, *void_arrays)
+            if block.stress is not None:  # what is heated closes its voids
+                cells = inside, *void_arrays
+                block.stress.spall_again(block.eos, cells, carried[:, 1:-1, 1:-1], block.nodes)
         return push, gained

@@ -243,7 +243,11 @@ def update_states(flow: Flow, dt: float) -> None:
     with flow.watch("flow"):
         # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
         flow.blocks.update(dt)
+        if flow.blocks.solid_pieces:
+            flow.blocks.relax(dt)
         flow.small_cells.redistribute_states(flow.clock.cfl / dt, dt)
+        if flow.blocks.spalls:
+            flow.blocks.open_voids(dt)
 
 
 def move_sides(motion: GridMotion, step: StepTime) -> None:

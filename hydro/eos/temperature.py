@@ -138,8 +138,8 @@ def _start_at(column: np.ndarray) -> np.ndarray:
 
 
 def _integrate(eos: Any, densities: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Energy [J/kg] and ln(T/T0) (2, m) at the densities that are reached from the first, at most all
-    of them (n,)."""
+    """Energy [J/kg] and ln(T/T0) (2, m) at the densities (n,), as far as they are reached from the
+    first."""
     scale = ENERGY_STEP_PART * float(eos.sound_speed(eos.rho0, 0.0)) ** 2
     with np.errstate(all="ignore"):
         solution = solve_ivp(

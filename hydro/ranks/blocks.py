@@ -42,6 +42,12 @@ class Blocks(list[Block]):
         self.pieces: Sequence[Piece] = [Piece(n, 0, block.ni) for n, block in enumerate(blocks)]
         self.cuts: Mapping[int, CutBlock] = {}
         self.workers = workers or Workers([1], 1)
+        self._find_solids()
+
+    def _find_solids(self) -> None:
+        """Which pieces are of solids, and whether any block has a law of spall."""
+        self.solid_pieces = [p for p in self.pieces if self[p.number].stress is not None]
+        self.spalls = any(b.stress is not None and b.stress.spall is not None for b in self)
 
     # --- in a step ---------------------------------------------------------------------------
 
@@ -52,6 +58,31 @@ class Blocks(list[Block]):
         workers.run(
             lambda n: phases.update(self[pieces[n].number], dt, workers.inside), len(pieces)
         )
+
+    def relax(self, dt: float) -> None:
+        """New stresses of solids, from the new states of their cells."""
+        pieces = self.solid_pieces
+        self.workers.run(lambda n: phases.relax(self[pieces[n].number], dt), len(pieces))
+
+    def open_voids(self, dt: float) -> None:
+        """Voids open in solids with a law of spall; their broken cells are counted."""
+        counts: list[Row] = []
+        for number, *_ in self.pieces:
+            stress = self[number].stress
+            spalls = stress is not None and stress.spall is not None
+            counts.append([phases.open_voids(self[number], dt) if spalls else 0])
+        for block in self:
+            if block.stress is not None:
+                block.stress.broken_cells = 0
+        for number, (count,) in self.exchange_pieces(counts):
+            stress = self[number].stress
+            if stress is not None:
+                stress.broken_cells += int(count)
+
+    def exchange_pieces(self, rows: Sequence[Row]) -> Sequence[tuple[int, Row]]:
+        """The number of a block and a row of one number of every piece of all ranks, from those
+        of one's own."""
+        return [(piece.number, row) for piece, row in zip(self.pieces, rows, strict=True)]
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
         """The row of STATE_ROW numbers that `scan` finds of every block, before whether it stands.

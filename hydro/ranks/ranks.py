@@ -97,6 +97,10 @@ class Ranks(Blocks):
             for rank, rows in zip(there, pairwise(self.bounds[number]), strict=True)
         ]
         self.pieces = [piece for rank, piece in all_pieces if rank == self.rank]
+        self._find_solids()
+        by_rank = [[piece for r, piece in all_pieces if r == rank] for rank in range(self.size)]
+        self._numbers_of_pieces = [piece.number for pieces in by_rank for piece in pieces]
+        self._piece_counts = [len(pieces) for pieces in by_rank]
         for number, there in enumerate(self.places):
             if len(there) > 1:
                 inside = self.rank in there
@@ -216,6 +220,10 @@ class Ranks(Blocks):
         for number, row in zip(self._order, table, strict=True):
             rows_of_blocks[number] = row
         return rows_of_blocks
+
+    def exchange_pieces(self, rows: Sequence[Row]) -> Sequence[tuple[int, Row]]:
+        table = self._gather_table(rows, 1, self._piece_counts)
+        return list(zip(self._numbers_of_pieces, table, strict=True))
 
     def _gather_table(self, rows: Sequence, width: int, counts: Sequence[int]) -> list[list[float]]:
         """Rows of `width` numbers of all ranks, `counts` of each, the first rank's first."""

@@ -35,6 +35,7 @@ from shockgrid.hydro.boundary import NodeMotion
 from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
 from shockgrid.hydro.motion.line import Line, StraightLine
 from shockgrid.hydro.remap.conserved import Slivers, remap_state
+from shockgrid.hydro.rows import HELD_ARRAYS
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.regrid.curves import compute_arc_lengths
 from shockgrid.regrid.errors import BadInput
@@ -108,7 +109,13 @@ class RemappedBlock:
 def _remap_block(block: Block, nodes: np.ndarray) -> tuple[dict[str, np.ndarray], Slivers]:
     """What the cells of a block hold on new nodes (2, mi+1, mj+1): see `remap_state`."""
     held = {name: block.get_inside(name) for name in block.held_arrays}
-    return remap_state(block.name, block.eos, block.geometry.curved, block.nodes, held, nodes)
+    new_held, slivers = remap_state(
+        block.name, block.eos, block.geometry.curved, block.nodes, held, nodes
+    )
+    if block.stress is not None:
+        cells = [new_held[name] for name in HELD_ARRAYS]
+        block.stress.spall_again(block.eos, cells, new_held["carried"], nodes)
+    return new_held, slivers
 
 
 def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:

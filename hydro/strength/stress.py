@@ -8,6 +8,7 @@ beside the phases of the flow (`hydro.phases`):
     trace     stress at the faces of the sides, in the fluxes of walls and open sides
     prepare   stress on the faces inside, for the flow's update                    theory F20.5
     relax     after fluxes and fields: strain, rotation and yield                  theory F20.8
+    spall     after all that finds pressures of cells: voids open by a law         theory F21
 """
 
 from __future__ import annotations
@@ -117,11 +118,13 @@ class Stress:
     def __init__(self, law: StrengthLaw, ni: int, nj: int, spall: SpallLaw | None = None):
         self.law = law
         self.spall = spall
-        self.broken_cells = 0
+        self.broken_cells = 0  # of the whole block, in the last step
         self._states_at_start: tuple = ()  # from the phase `start` to `predict`
         self.arrays = make_solid_arrays(ni, nj)
         self.rates = np.zeros((RATE_ROWS, ni, nj))
         self.sides = np.zeros((SIDE_ROWS, 2 * (ni + nj)))
+        # increase of the plastic strain in a step, for a law of spall
+        self.strained = np.zeros((ni, nj) if spall is not None else (1, 1))
 
     def start(self, block: Any) -> None:
         """Phase 2, when the cells along the sides are gathered: see `start_stress`."""
@@ -194,7 +197,7 @@ class Stress:
         )  # fmt: skip
 
     def relax(self, block: Any, dt: float) -> None:
-        """Phase 6, after the fields have been carried: the new stress."""
+        """Phase 6, with the new state and the fields carried: the new stress."""
         arrays = self.arrays
         rows = block.rows.start, block.rows.stop
         measure_rates = make_measure_rates(block.geometry)
@@ -207,26 +210,54 @@ class Stress:
         laws = self._find_laws(states, block.carried_new)
         shear = self._find_shear(states, block.carried_new)
         plastic_strain = block.carried_new[self.FIRST_FIELD + PLASTIC_STRAIN, 1:-1, 1:-1]
-        before = plastic_strain.copy() if self.spall is not None else plastic_strain
+        if self.spall is not None:
+            np.negative(plastic_strain, out=self.strained)
         update_stress(block.carried_new, self.rates, laws, shear, tuple(held), dt, rows)
         if self.spall is not None:
-            self._spall(block, held, plastic_strain - before, dt)
+            self.strained += plastic_strain
+
+    def spall_new_cells(self, block: Any, dt: float) -> int:
+        """Phase 6, last: the law of spall on this process's rows; how many cells are broken."""
+        rows = slice(block.rows.start, block.rows.stop)
+        held = [array[..., rows, :] for array in strip_ghosts(block.list_new())]
+        carried = block.carried_new[:, 1:-1, 1:-1][:, rows]
+        nodes = block.nodes_new[:, rows.start : rows.stop + 1]
+        strained = self.strained[rows]
+        return self._spall(
+            block.eos, held, carried, nodes, strained, self.rates[EQUIVALENT][rows], dt
+        )
+
+    def spall_again(
+        self, eos: Any, held: Sequence[np.ndarray], carried: np.ndarray, nodes: np.ndarray
+    ) -> None:
+        """The law of spall, in no time, on cells whose pressures have been found anew.
+
+        held: arrays of HELD_ARRAYS without ghosts, carried (n, mi, mj), nodes (2, mi + 1, mj + 1).
+        """
+        if self.spall is not None:
+            nothing = np.zeros(carried.shape[1:])
+            self._spall(eos, held, carried, nodes, nothing, nothing, 0.0)
 
     def _spall(
-        self, block: Any, held: Sequence[np.ndarray], strained: np.ndarray, dt: float
-    ) -> None:
+        self,
+        eos: Any,
+        held: Sequence[np.ndarray],
+        carried: np.ndarray,
+        nodes: np.ndarray,
+        strained: np.ndarray,
+        strain_rate: np.ndarray,
+        dt: float,
+    ) -> int:
         """Advance the fields of spall; voids open, and broken cells lose their stress.
 
-        strained (ni, nj): increase of the plastic strain in the step.
+        As of `spall_again`; strained, strain_rate: increase of the plastic strain in the step, and
+        rate [1/s].  Returns how many cells are broken.
         """
         assert self.spall is not None
-        rows = slice(block.rows.start, block.rows.stop)
-        state, *others = (array[..., rows, :] for array in strip_ghosts(held))
-        carried = block.carried_new[:, 1:-1, 1:-1][:, rows]
+        state, *others = held
+        rho, p = state[RHO], state[P]
         stress = carried[self.FIRST_FIELD : self.FIRST_FIELD + PLASTIC_STRAIN]
         values = carried[self._find_spall_fields()].copy()
-        eos = block.eos
-        rho, p = state[RHO], state[P]
         temperature = None
         if self.spall.needs_temperature:
             temperature = compute_temperature(eos, state, *others)
@@ -237,17 +268,17 @@ class Stress:
             energy=compute_energy(eos, state, *others),
             sound=eos.sound_speed(rho, p),
             stress=stress,
-            strained=strained[rows],
-            strain_rate=self.rates[EQUIVALENT][rows],
+            strained=strained,
+            strain_rate=strain_rate,
             temperature=temperature,
-            extent=find_shorter_extent(block.nodes_new[:, rows.start : rows.stop + 1]),
+            extent=find_shorter_extent(nodes),
         )
         pressure = self.spall.relax(values, cells, dt)
         open_voids(eos, pressure, state, *others)
         carried[self._find_spall_fields()] = values
         broken = self.spall.find_broken(values)
-        self.broken_cells = int(np.count_nonzero(broken))
         stress[:, broken | (others[0] != 0.0)] = 0.0
+        return int(np.count_nonzero(broken))
 
     def _find_spall_fields(self) -> slice:
         """Where the fields of spall are among the carried ones: after those of the stress."""

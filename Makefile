@@ -27,7 +27,7 @@ help:
 	@echo "make verify   the longer tests too, then shockgrid verify: tables of docs/ anew"
 	@echo "make soak     20 minutes of kills, damaged files, odd decks; SOAK='--minutes 60': longer"
 	@echo "make bench    speed, cold and warm start"
-	@echo "make accuracy the figures of docs/accuracy.md anew; ACCURACY='--short': fewer, printed only"
+	@echo "make accuracy the tables over ranges in docs/verification.md anew; ACCURACY='--short': fewer, printed only"
 	@echo "make docs     the site of all pages and docstrings in site/; NOTEBOOKS=true runs the notebooks too"
 	@echo "make dist     wheel and sdist in dist/; make sbom: dist/shockgrid.cdx.json, what a run stands on"
 	@echo "make requirements   the oldest and the pinned packages of requirements/ anew"
@@ -91,7 +91,7 @@ verify: lint
 # SOAK: options of tests/soak, such as --minutes 60 or --only kills,flips; goes on with what
 # out/soak.jsonl holds: remove that file after a change of the code
 soak: $(DEVELOP)
-	@$(BIN)/python tests/soak --json docs/results/soak.json $(SOAK); found=$$?; \
+	@$(BIN)/python tests/soak --write $(SOAK); found=$$?; \
 	  $(BIN)/python docs/generate.py; exit $$found
 
 # PEER: a built checkout of CloverLeaf_ref to measure beside

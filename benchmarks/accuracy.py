@@ -1,4 +1,4 @@
-"""All figures of docs/accuracy.md, then the page: `make accuracy`.
+"""Figures over ranges of decks in docs/verification.md, then the page: `make accuracy`.
 
     python benchmarks/accuracy.py                       everything: half an hour and more
     python benchmarks/accuracy.py --only lines null     these parts alone, the others stay
@@ -7,7 +7,7 @@
 
 Parts: rates (growth beside theory), polars (pressure behind a running contact point), lines (a flat
 line, the shock begun a part of a cell farther away), null (a wavy line in one gas), pairs (random
-Riemann problems).  A part is written when all of it is measured, in place of all that was there, so
+Riemann problems).  The tables of a part are written to docs/results when all of it is measured, so
 that rows of two versions of the scheme never stand side by side.  Note: parts can.  After a
 change of the scheme make all parts anew.
 """
@@ -26,11 +26,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "docs"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import accuracy_tables as tables  # noqa: E402
-
+from benchmarks import accuracy_tables as tables  # noqa: E402
 from benchmarks.growth_accuracy import list_decks, measure_row, write_rows  # noqa: E402
+from benchmarks.result_tables import RESULTS, write_result  # noqa: E402
 from oracles.random_pairs import measure_random_pairs  # noqa: E402
 from oracles.shocked_lines import measure_null_line, sweep_flat_line  # noqa: E402
 from shockgrid.problems.deck import RunControl  # noqa: E402
@@ -38,7 +38,6 @@ from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck  
 from shockgrid.problems.interface_instability.theories import PATH, Measured  # noqa: E402
 from shockgrid.regrid.errors import RunFailure  # noqa: E402
 
-RESULTS = ROOT / "docs" / "results"
 PICTURE = ROOT / "docs" / "pictures" / "accuracy.png"
 COMMAND = "make accuracy"
 Rows = list[dict[str, Any]]
@@ -169,9 +168,10 @@ def make_rates(options: argparse.Namespace) -> None:
     if options.short:
         for materials in ("gas", "condensed"):
             print(*tables.table_rates(rows, materials, CELLS[0]), sep="\n")
-        print(*tables.doubt_rates(rows), sep="\n")
         return
     write_rows(rows, PATH, COMMAND)
+    for name, materials in (("gas", "gas"), ("metals", "condensed")):
+        write_result(f"accuracy-rates-{name}", tables.table_rates(rows, materials, CELLS[-1]))
     draw_rates(rows, PICTURE)
 
 
@@ -180,6 +180,10 @@ def make_polars(options: argparse.Namespace) -> None:
     words = SHORT_POLARS if options.short else [*POLARS, "--json", str(RESULTS / "bench.json")]
     script = Path(__file__).with_name("polars_over_angle.py")
     subprocess.run([sys.executable, str(script), *words], cwd=ROOT, check=True)
+    if not options.short:
+        measured = json.loads((RESULTS / "bench.json").read_text(encoding="utf-8"))
+        rows = measured["polars over the angle"]["rows"]
+        write_result("accuracy-polars", tables.table_polars(rows))
 
 
 def make_lines(options: argparse.Namespace) -> None:
@@ -212,21 +216,12 @@ PARTS = {
 
 
 def keep(part: str, rows: Rows, short: bool) -> None:
-    """Put a part into docs/results/accuracy.json, or only print it."""
+    """Put the table of a part into docs/results, or only print it."""
+    lines = getattr(tables, f"table_{part}")(rows)
     if short:
-        print(*getattr(tables, f"table_{part}")(rows), sep="\n")
-        print(*getattr(tables, f"doubt_{part}")(rows), sep="\n")
-        return
-    path = RESULTS / "accuracy.json"
-    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    known[part] = {"command": COMMAND, "rows": rows}
-    blocks = [
-        f' "{name}": {{\n  "command": {json.dumps(known[name]["command"])},\n  "rows": [\n'
-        + ",\n".join(f"   {json.dumps(row, ensure_ascii=False)}" for row in known[name]["rows"])
-        + "\n  ]\n }"
-        for name in sorted(known)
-    ]
-    path.write_text("{\n" + ",\n".join(blocks) + "\n}\n", encoding="utf-8")
+        print(*lines, sep="\n")
+    else:
+        write_result(f"accuracy-{part}", lines)
 
 
 def draw_rates(rows: Iterable[Measured], path: Path) -> None:

@@ -1,7 +1,7 @@
 """Past runs that foretell others, and how well the cost of ten decks is foretold.
 
     python benchmarks/forecast_table.py past     runs/past_runs.json anew: small runs
-    python benchmarks/forecast_table.py judge    docs/results/forecast.json anew: ten other runs
+    python benchmarks/forecast_table.py judge    docs/results/forecast.txt anew: ten other runs
 
 The runs that are judged have other cells than those of the table.  What is foretold at a tenth, a
 quarter and a half of a run's wall time is found by giving its history, step by step, to the class
@@ -10,7 +10,6 @@ that the progress line asks.  Other work on the machine counts: leave it alone m
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -24,6 +23,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.result_tables import make_table, write_result  # noqa: E402
 from shockgrid.hydro.clock import START_FACTORS  # noqa: E402
 from shockgrid.runs.deck.reading import read_deck  # noqa: E402
 from shockgrid.runs.forecast import (  # noqa: E402
@@ -148,6 +148,22 @@ def judge(deck: str, setting: str, folder: Path) -> dict[str, Any]:
     }
 
 
+def tabulate(rows: list[dict[str, Any]]) -> list[str]:
+    """Steps and wall time of the judged runs: foretold over real, with the range in parentheses."""
+    heads = ["run", "cells", "steps", "predicted before", "wall time [s]"]
+    heads += [f"at {share:.0%} of it" for share in SHARES]
+    lines = []
+    for row in rows:
+        low, likely, high = row["foretold steps"]
+        cells = [f"`{row['deck']}`", str(row["cells"]), str(row["steps"])]
+        cells += [f"{likely} ({low} to {high})", f"{row['seconds']:.1f}"]
+        for share in SHARES:
+            likely, low, high = row[f"{share:.0%}"]
+            cells.append(f"{likely:.2f} ({low:.2f} to {high:.2f})")
+        lines.append(cells)
+    return make_table(heads, lines)
+
+
 def main() -> int:
     kind = sys.argv[1] if len(sys.argv) == 2 else ""
     if kind not in ("past", "judge"):
@@ -163,9 +179,9 @@ def main() -> int:
         PAST_RUNS.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
         read_past.cache_clear()
     else:
-        command = "python benchmarks/forecast_table.py judge"
-        text = json.dumps({"command": command, "rows": rows}, indent=1)
-        (ROOT / "docs" / "results" / "forecast.json").write_text(text + "\n", encoding="utf-8")
+        write_result(
+            "forecast", ["`python benchmarks/forecast_table.py judge`", "", *tabulate(rows)]
+        )
     return 0
 
 

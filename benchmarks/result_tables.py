@@ -1,4 +1,7 @@
-"""Tables of the benchmarks, kept as JSON by `--json FILE`; the machine; time of ended commands."""
+"""Tables of the benchmarks, kept as JSON by `--json FILE`, or as Markdown for the pages of docs/.
+
+Also the machine that measured, and the processor time of commands that have ended.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import json
 import os
 import platform
 import sys
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,9 +24,25 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
+RESULTS = Path(__file__).resolve().parents[1] / "docs" / "results"
+
 # commands that are timed start from bytecode on the disk, as installed ones do: where a machine's
 # environment forbids to write it, each start would compile all sources anew
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """The lines of a Markdown table."""
+    heads = list(heads)
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for row in rows:
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |")
+    return lines
+
+
+def write_result(name: str, lines: Iterable[str]) -> None:
+    """Write docs/results/NAME.txt, which `docs/generate.py` pastes into its page."""
+    (RESULTS / f"{name}.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def read_child_time() -> Any:

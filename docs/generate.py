@@ -7,20 +7,14 @@
 A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`:
 
     head PROBLEM                docstring of the problem's module
-    verify PROBLEM...           rows of results/verify.json ("*": all, with the problem's name;
-                                "first": one of each problem)
+    verify PROBLEM...           rows of results/verify.json ("first": one of each problem)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
-    output NAME                 the command and its output, of a run the problem's summary
+    output NAME                 the command and its output: a run's summary, a study's orders
     bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
-    accuracy PART...            a part of the page of `make accuracy`; see docs/accuracy_tables.py
-    study NAME PART             a part of the results of a study; see docs/study_tables.py
+    result NAME                 docs/results/NAME.txt, which a benchmark or a trial has written
     causes ends                 why runs end early, of `runs.early_end.causes`
-    cost PART                   a table of docs/cost.md; see docs/cost_tables.py
-    soak PART                   outcomes or defects of `make soak`; see docs/soak_table.py
-    regrid_suite PART           a table of docs/regrid-suite.md; see docs/regrid_suite_table.py
-    motions PART                outcomes of random motions; see docs/motions_table.py
-    race PART                   tables of the race; see benchmarks/race/tables.py
+    rules verdict               when the verdict of a run has a reservation
 
 Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
 Note: a result is as old as its last run; after a change of the scheme run all again.
@@ -46,21 +40,14 @@ from typing import Any
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 RESULTS = DOCS / "results"
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path.insert(0, str(ROOT))
 
-from accuracy_tables import fill_accuracy  # noqa: E402
-from cost_tables import fill_cost  # noqa: E402
-from motions_table import fill_motions  # noqa: E402
-from regrid_suite_table import fill_regrid_suite  # noqa: E402
-from soak_table import fill_soak  # noqa: E402
-from study_tables import fill_study, read_study  # noqa: E402
-
-from benchmarks.race.tables import fill_race  # noqa: E402
+from benchmarks.result_tables import make_table  # noqa: E402
 from shockgrid.problems.registry import read_docstring  # noqa: E402
 from shockgrid.runs.early_end.causes import ENDS  # noqa: E402
-from shockgrid.runs.inspection.account import describe_convexity, measure_drifts  # noqa: E402
+from shockgrid.runs.inspection.account import RULES, describe_convexity, measure_drifts  # noqa: E402
 from shockgrid.runs.store.reader import RunData  # noqa: E402
-from shockgrid.runs.verify import HEADS, describe_bars, format_record  # noqa: E402
+from shockgrid.runs.verify import HEADS, format_record  # noqa: E402
 
 REGION = re.compile(
     r"(<!-- generated: (?P<kind>\w+) (?P<arguments>.*?) -->\n)(.*?)(<!-- end generated -->)",
@@ -117,7 +104,7 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
         result = {"command": command, "label": figure.get("label", name)}
         if "study" in figure:
             shutil.copy(directory / "study.png", DOCS / "pictures" / f"{name}.png")
-            return {**result, **read_study(directory, figure["columns"])}
+            return {**result, "output": find_orders(done.stdout)}
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
         result |= read_run(directory, done.stderr)
@@ -126,6 +113,12 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
             words = (directory / "early-end.txt").read_text(encoding="utf-8")
             result["output"] = words.replace(str(directory), "DIR").splitlines()
         return result
+
+
+def find_orders(said: str) -> list[str]:
+    """The table of orders in the summary of a study; no lines where there is none."""
+    _, title, rest = said.partition("orders over ")
+    return [line.rstrip() for line in (title + rest).partition("\n\n")[0].splitlines()]
 
 
 def read_run(directory: Path, said: str) -> dict[str, Any]:
@@ -198,13 +191,6 @@ def find_cell(result: dict[str, Any], column: str) -> str:
     return "" if value is None else str(value)
 
 
-def make_table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """A Markdown table."""
-    heads = list(heads)
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    return lines + ["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows]
-
-
 def fill_runs(arguments: str) -> list[str]:
     """`NAME... | COLUMN; HEAD=COLUMN; ...`, the usual columns where none are given.
 
@@ -239,23 +225,19 @@ def fill_sizes(arguments: str) -> list[str]:
 
 
 def fill_verify(arguments: str) -> list[str]:
-    """Rows of the named problems; all, with the sum of bars, for `*`; the finest of each problem's
-    first quantity for `first`."""
-    document = read_result("verify")
+    """Rows of the named problems; for `first` each problem's first quantity on its finest grid."""
+    records = read_result("verify")["rows"]
     if arguments.strip() == "first":
         leading = {}  # by problem
-        for record in document["rows"]:
+        for record in records:
             lead = leading.setdefault(record["problem"], record)
             if record["what"] == lead["what"]:
                 leading[record["problem"]] = record
         return make_table(HEADS[:5], [format_record(record)[:5] for record in leading.values()])
-    everything = arguments.strip() == "*"
-    records = [r for r in document["rows"] if everything or r["problem"] in arguments.split()]
-    first = 0 if everything or len(arguments.split()) > 1 else 1
-    lines = make_table(HEADS[first:], [format_record(record)[first:] for record in records])
-    if everything:
-        lines = [f"`{document['command']}`: {describe_bars(records)}.", "", *lines]
-    return lines
+    names = arguments.split()
+    first = 0 if len(names) > 1 else 1
+    rows = [format_record(record)[first:] for record in records if record["problem"] in names]
+    return make_table(HEADS[first:], rows)
 
 
 def fill_output(arguments: str) -> list[str]:
@@ -275,6 +257,18 @@ def fill_bench(arguments: str) -> list[str]:
     return [f"`{found['command']}`{machine}.", "", *table]
 
 
+def fill_result(name: str) -> list[str]:
+    """A table as its benchmark has written it."""
+    return (RESULTS / f"{name.strip()}.txt").read_text(encoding="utf-8").splitlines()
+
+
+def fill_rules(_: str) -> list[str]:
+    """What the verdict of a run measures, and from where on it reports it."""
+    rows = [[rule.name, rule.meaning, f"above {rule.limit:g}"] for rule in RULES]
+    rows.append(["cautions", "sentences of the problem on this deck and run", "above 0"])
+    return make_table(["rule", "what is measured", "reported"], rows)
+
+
 def fill_causes(arguments: str) -> list[str]:
     """Causes of early ends: what is seen, why, what has helped."""
     rows = []
@@ -291,14 +285,9 @@ KINDS = {
     "sizes": fill_sizes,
     "output": fill_output,
     "bench": fill_bench,
-    "accuracy": fill_accuracy,
-    "study": fill_study,
+    "result": fill_result,
     "causes": fill_causes,
-    "cost": fill_cost,
-    "soak": fill_soak,
-    "race": fill_race,
-    "regrid_suite": fill_regrid_suite,
-    "motions": fill_motions,
+    "rules": fill_rules,
 }
 
 

@@ -202,6 +202,7 @@ def verify(
             cells = format_record(record)
             line = "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=False))
             say(f"{line}  {cells[-1]}".rstrip())
+    say(describe_bars(records))
     if output is not None:
         made = {
             "command": " ".join(

@@ -23,7 +23,15 @@ from benchmarks.race.compiled_peers import (
     spend,
 )
 from benchmarks.race.ours import run_ours
-from benchmarks.race.tables import BAR, NAMES, NOT_SUMMED_UP, RESULTS, write_tables
+from benchmarks.race.tables import (
+    BAR,
+    NAMES,
+    NOT_SUMMED_UP,
+    RESULTS,
+    list_cases,
+    list_summary,
+)
+from benchmarks.result_tables import write_result
 
 REFERENCE_CELLS = 256
 ROOT = Path(__file__).resolve().parents[2]
@@ -161,8 +169,10 @@ def main() -> None:
         document["rows"] = sorted(kept + new, key=lambda r: order.index(r["case"]))
         cases = document["cases"] | {name: {"title": case.title, "error": case.error_name}}
         document["cases"] = {known: cases[known] for known in order if known in cases}
-    print("\n".join(write_tables(document)))
+    print("\n".join(list_cases(document)))
     if options.write:
+        write_result("race", list_cases(document))
+        write_result("race-summary", list_summary(document))
         RESULTS.write_text(json.dumps(document, indent=1) + "\n")
         draw(document)
 

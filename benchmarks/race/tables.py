@@ -1,17 +1,18 @@
-"""Tables of the race from docs/results/race.json, for its page and for README.
+"""Tables of the race from docs/results/race.json, as Markdown in docs/results.
 
-race tables     a table a case: code, cells, error, CPU seconds
-race summary [CASE...]    CPU seconds to an error of BAR, a row a case; codes that ran none left out
+race            a table a case: for each code its errors and CPU seconds by cells
+race-summary    CPU seconds to an error of BAR, a row a case
 """
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from benchmarks.result_tables import make_table
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "race.json"
 NAMES = {
@@ -29,17 +30,6 @@ NOT_SUMMED_UP = "growth-behind", "contact", "sedov"
 BAR = 0.01  # the error that times are compared at
 CHANCE = 0.1  # of BAR: below it errors cancel, where a finer grid has a greater one
 FARTHEST = 10.0  # times the longest run: so far times are extrapolated
-
-
-def fill_race(arguments: str) -> list[str]:
-    """Lines of the part `arguments`: `tables`, or `summary` and the names of its cases."""
-    document = json.loads(RESULTS.read_text(encoding="utf-8"))
-    part, *cases = arguments.split()
-    if part == "tables":
-        return write_tables(document)
-    return write_summary(
-        document, cases or [n for n in document["cases"] if n not in NOT_SUMMED_UP]
-    )
 
 
 def find_time(rows: list[dict[str, Any]], code: str) -> tuple[float, bool]:
@@ -98,28 +88,30 @@ def typeset(words: str) -> str:
     return words
 
 
-def write_summary(document: dict[str, Any], cases: list[str]) -> list[str]:
-    """One row a case."""
+def list_summary(document: dict[str, Any]) -> list[str]:
+    """One row a case; codes that ran none of them are left out."""
+    cases = [name for name in document["cases"] if name not in NOT_SUMMED_UP]
     ran = {r["code"] for r in document["rows"] if r["case"] in cases}
     codes = {code: name for code, name in NAMES.items() if code in ran}
-    lines = [f"| CPU seconds to {100 * BAR:.0f} % | {' | '.join(codes.values())} |"]
-    lines.append("|---" * (len(codes) + 1) + "|")
+    lines = []
     for name in cases:
         rows = [r for r in document["rows"] if r["case"] == name]
-        cells = " | ".join(describe_time(rows, code) for code in codes)
-        lines.append(f"| {typeset(document['cases'][name]['title'])} | {cells} |")
-    return lines
+        title = typeset(document["cases"][name]["title"])
+        lines.append([title, *(describe_time(rows, code) for code in codes)])
+    return make_table([f"CPU seconds to {100 * BAR:.0f} %", *codes.values()], lines)
 
 
-def write_tables(document: dict[str, Any]) -> list[str]:
-    """One table a case."""
+def list_cases(document: dict[str, Any]) -> list[str]:
+    """One table a case, a row a code: `cells: error (CPU seconds)`, grid by grid."""
     lines: list[str] = []
     for name, case in document["cases"].items():
         title = typeset(case["title"])
-        error = typeset(case["error"])
-        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {error}.", ""]
-        lines += ["| code | cells | error | CPU seconds |", "|---|---|---|---|"]
+        found: dict[str, list[str]] = {}
         for row in (r for r in document["rows"] if r["case"] == name):
             error = f"{100.0 * row['error']:.3g} %" if abs(row["error"]) > 1e-9 else "round-off"
-            lines.append(f"| {NAMES[row['code']]} | {row['cells']} | {error} | {row['cpu']:.3g} |")
+            grids = found.setdefault(NAMES[row["code"]], [])
+            grids.append(f"{row['cells']}: {error} ({row['cpu']:.3g})")
+        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"Error: {typeset(case['error'])}."]
+        rows = [[code, ", ".join(grids)] for code, grids in found.items()]
+        lines += ["", *make_table(["code", "cells: error (CPU seconds)"], rows)]
     return lines[1:]

@@ -5,14 +5,14 @@
 Grids of 2 x 7 to 40 x 30 cells, either way up, are moved in four ways: smooth, noisy, bumped, a
 single node.  Each answer is judged by exact arithmetic on what was returned, in code that the
 regridder does not use: every cell convex but for corners of the block that the sides turn over,
-sides untouched, the boundary simple.  `--write` makes docs/results/random-motions.json, `--keep`
+sides untouched, the boundary simple.  `--write` makes docs/results/random-motions.txt, `--keep`
 a file of the motions that have no grid on a simple boundary.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,6 @@ from shockgrid.regrid.errors import RegridFailure
 from shockgrid.regrid.measure.corners import BLOCK_CORNERS, compute_corner_signs, compute_turns
 from shockgrid.regrid.sides import SIDES
 
-RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
 KINDS = ("smooth", "noisy", "bumped", "single node")
 OUTCOMES = (
     "valid",
@@ -234,9 +233,15 @@ def main() -> None:
     if keeper:
         keeper.write(options.keep)
     if options.write:
-        document = {"seed": options.seed, "motions": tried, "kinds": counts}
-        path = RESULTS / "random-motions.json"
-        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+        from benchmarks.result_tables import make_table, write_result
+
+        rows = []
+        for outcome in OUTCOMES:
+            found = [counts[kind][outcome] for kind in KINDS]
+            rows.append([outcome, *map(str, found), str(sum(found))])
+        lines = make_table(["outcome", *KINDS, "all"], rows)
+        write_result("random-motions", [f"{tried} motions, seed {options.seed}.", "", *lines])
 
 
 if __name__ == "__main__":

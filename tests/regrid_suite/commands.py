@@ -91,11 +91,15 @@ def make(names, folder, kind, force) -> None:
 @click.option("--lag/--no-lag", default=True, help="Look for the converged grid at the end.")
 @click.option("--add", is_flag=True, help="Keep what the file has of other regridders, marches.")
 def run(marches, names, page, lag, add) -> None:
-    """Run the regridders on marches: a line each, and a table with --json."""
+    """Run the regridders on marches: a line each; with --json also the tables of docs/results."""
     from regrid_suite.results import run_all
 
     loaded = [load(name) for name in marches or NAMES]
     run_all(loaded, choose_present(names), lag, page, click.echo, add)
+    if page is not None:
+        from regrid_suite.tables import write_tables
+
+        write_tables(page)
 
 
 @suite.command()

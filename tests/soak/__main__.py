@@ -10,7 +10,6 @@ import os
 
 os.environ["NUMBA_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # see child.py
 
-import json
 import shutil
 import sys
 import tempfile
@@ -20,10 +19,11 @@ from pathlib import Path
 import click
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # the folder of this package
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # the folder of benchmarks
 
 from soak.catalogue import make_kinds
 from soak.child import import_commands
-from soak.record import Record, describe
+from soak.record import Record, describe, list_outcomes
 
 
 @click.command(help=__doc__)
@@ -39,9 +39,9 @@ from soak.record import Record, describe
     show_default=True,
     help="File of the outcomes; one that is there is gone on with.",
 )
-@click.option("--json", "page", type=click.Path(path_type=Path), help="Write the table there, too.")
+@click.option("--write", is_flag=True, help="Write the table of docs/soak.md.")
 @click.option("--reproduce", metavar="KIND:NUMBER", help="Make one trial again; keep its files.")
-def soak(minutes, seed, only, most, kept, page, reproduce) -> None:
+def soak(minutes, seed, only, most, kept, write, reproduce) -> None:
     folder = Path(tempfile.mkdtemp(prefix="soak-")).resolve()
     import_commands()
     kinds = {kind.name: kind for kind in make_kinds(seed, folder)}
@@ -67,8 +67,10 @@ def soak(minutes, seed, only, most, kept, page, reproduce) -> None:
         shutil.rmtree(folder, ignore_errors=True)
     summary = record.summarise(kinds.values())
     click.echo(describe(summary))
-    if page:
-        page.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    if write:
+        from benchmarks.result_tables import write_result
+
+        write_result("soak", list_outcomes(summary))
     sys.exit(any(kind["defects"] for kind in summary["kinds"]))
 
 

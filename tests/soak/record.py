@@ -88,3 +88,23 @@ def describe(summary: dict[str, Any]) -> str:
             lines.append(f"  {defect['count']:6d}  DEFECT {defect['label']}")
             lines.append(f"          --reproduce {defect['reproduce']}  {defect['words']}")
     return "\n".join(lines)
+
+
+def list_outcomes(summary: dict[str, Any]) -> list[str]:
+    """The summary as Markdown: a table of all kinds of trials, then one of the defects."""
+    from benchmarks.result_tables import make_table
+
+    rows = []
+    defects = []
+    for kind in summary["kinds"]:
+        ends = "; ".join(f"{count} {label}" for label, count in kind["outcomes"].items())
+        wrong = sum(defect["count"] for defect in kind["defects"])
+        tried = f"{kind['tried']} of {kind['wanted']}"
+        rows.append([f"`{kind['kind']}`: {kind['about']}", tried, ends, str(wrong)])
+        for defect in kind["defects"]:
+            defects.append([defect["label"], str(defect["count"]), f"`{defect['reproduce']}`"])
+    lines = make_table(["trials", "tried", "outcomes", "defects"], rows)
+    lines = [f"Seed {summary['seed']}.", "", *lines, ""]
+    if not defects:
+        return [*lines, "No defect was found."]
+    return [*lines, *make_table(["defect", "trials", "the first"], defects)]

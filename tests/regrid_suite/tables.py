@@ -1,11 +1,9 @@
-"""Tables of docs/regrid-suite.md, from docs/results/regrid_suite.json.
+"""Tables of docs/regrid-suite.md, as Markdown in docs/results, from the JSON of a run.
 
-regrid_suite regridders   what was run, of which version, how far it came
-regrid_suite common       the marches to whose end several came: medians and worst values
-regrid_suite plane        every plane march: gap and smallest sine, or the step that had no grid
-regrid_suite space        the same in space: smallest sine
-regrid_suite cost         what the mushroom's roll costs a flow, with the term of the time step
-regrid_suite formulas     every march: cells, steps, words
+regrid-suite-regridders   what was run, of which version, how far it came
+regrid-suite-common       the marches to whose end several came: medians and worst values
+regrid-suite-space        every march in space: smallest sine and cost
+regrid-suite-cost         what the mushroom's roll costs a flow, with the term of the time step
 """
 
 from __future__ import annotations
@@ -14,25 +12,22 @@ import json
 from pathlib import Path
 from statistics import median
 
-from accuracy_tables import make_table
+from benchmarks.result_tables import make_table, write_result
 
-RESULTS = Path(__file__).resolve().parent / "results"
-COMPARED = ("barrier", "brackbill-saltzman", "tmop-size", "tmop-shape", "winslow", "transfinite")
 COMMON = ("barrier", "brackbill-saltzman", "tmop-size")
 
 
-def fill_regrid_suite(part: str) -> list[str]:
-    """The lines of a part of the page."""
-    document = json.loads((RESULTS / "regrid_suite.json").read_text(encoding="utf-8"))
+def write_tables(page: Path) -> None:
+    """Write the tables of the results in the file `page`."""
+    document = json.loads(page.read_text(encoding="utf-8"))
     rows = {(row["regridder"], row["march"]): row for row in document["rows"]}
-    return {
-        "regridders": _list_regridders,
-        "common": _compare_common,
-        "plane": _list_plane,
-        "space": _list_space,
-        "cost": _tell_cost,
-        "formulas": _list_marches,
-    }[part.strip()](document, rows)
+    for name, tabulate in (
+        ("regridders", _list_regridders),
+        ("common", _compare_common),
+        ("space", _list_space),
+        ("cost", _tell_cost),
+    ):
+        write_result(f"regrid-suite-{name}", tabulate(document, rows))
 
 
 def _is_whole(row: dict | None) -> bool:
@@ -92,16 +87,6 @@ def _tell(row: dict | None) -> str:
     return f"{gap}{row['sine']:.3f}{cut}"
 
 
-def _list_plane(document: dict, rows: dict) -> list[str]:
-    compared = [who for who in COMPARED if any(name == who for name, _ in rows)]
-    table = [
-        [f"`{march['name']}`", *(_tell(rows.get((who, march["name"]))) for who in compared)]
-        for march in document["marches"]
-        if len(march["cells"]) == 2
-    ]
-    return make_table(["march", *(f"`{who}`" for who in compared)], table)
-
-
 def _round(cost: float) -> str:
     return f"{cost:.0f}" if cost >= 10.0 else f"{cost:.2g}"
 
@@ -136,11 +121,3 @@ def _tell_cost(document: dict, rows: dict) -> list[str]:
             numbers += [f"{row['gap']:.2f}", f"{row['sine']:.3f}"]
             table.append([f"`{name}`", f"`{who}`", *numbers])
     return make_table(heads, table)
-
-
-def _list_marches(document: dict, rows: dict) -> list[str]:
-    table = [
-        [f"`{m['name']}`", " × ".join(map(str, m["cells"])), str(m["steps"]), m["about"]]
-        for m in document["marches"]
-    ]
-    return make_table(["march", "cells", "steps", ""], table)

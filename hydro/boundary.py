@@ -258,8 +258,10 @@ class Inflow(Segment):
 
     def __init__(self, block, side, start, stop, state, velocity=None, carried=None):
         super().__init__(block, side, start, stop)
-        if block.stress is not None:  # solid comes in without stress where nothing is said
-            carried = dict.fromkeys((field.name for field in STRESS_FIELDS), 0.0) | (carried or {})
+        if block.stress is not None:  # solid comes in whole and without stress, unless said
+            spall = block.stress.spall
+            own_fields = (*STRESS_FIELDS, *(spall.fields if spall is not None else ()))
+            carried = dict.fromkeys((field.name for field in own_fields), 0.0) | (carried or {})
         values = read_values(f"{self}: inflow segment", block.carried_fields, carried)
         self._carried = values[:, None]
         self.state = state if callable(state) else (lambda t: state)

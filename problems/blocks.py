@@ -27,20 +27,16 @@ from shockgrid.hydro.carried.fields import CarriedField
 from shockgrid.hydro.contacts.necks import Necks
 from shockgrid.hydro.eos.materials import (
     Material,
-    check_solid,
     find_material,
     find_name,
     make_material,
-    make_strength,
 )
 from shockgrid.hydro.links import join, slide
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.sources import make_gravity
-from shockgrid.hydro.strength.laws import StrengthLaw
 from shockgrid.problems.deck import (
     NONE,
     Coordinate,
-    Deck,
     DeckTable,
     Limiter,
     Name,
@@ -52,6 +48,7 @@ from shockgrid.problems.deck import (
     place_file,
 )
 from shockgrid.problems.problem import Problem, Report
+from shockgrid.problems.solids import BodyTable, SolidDeck, find_laws, list_fluids
 from shockgrid.regrid.domains import distribute_by_arc_length
 from shockgrid.regrid.equidistribution.weights import Expression
 from shockgrid.regrid.errors import BadInput, RegridFailure, suggest
@@ -135,7 +132,7 @@ class BlockSide(DeckTable, kw_only=True):
     options: key(Options, "further options of the kind, passed on") = NONE
 
 
-class BlockTable(DeckTable, kw_only=True):
+class BlockTable(BodyTable, kw_only=True):
     """One block: its grid, its material, its state and its sides."""
 
     name: key(Name, "name, for links and files")
@@ -149,11 +146,6 @@ class BlockTable(DeckTable, kw_only=True):
     v: key(Formula, "velocity along y [m/s], of x and y") = 0.0
     p: key(Formula, "pressure [Pa], of x and y") = 1e5
     carried: key(tuple[CarriedTable, ...], "fields that its cells carry with their mass") = ()
-    strength: key(
-        bool | Numbers,
-        "true: it bears shear, by the material's strength_law; or a table such as {law = "
-        '"perfect", shear_modulus = ..., yield_strength = ...} [Pa]',
-    ) = False
     side: key(tuple[BlockSide, ...], "what is at its sides that are not linked") = ()
 
 
@@ -186,7 +178,7 @@ CHANNEL = BlockTable(  # air that a piston drives into a channel with a bump
 )
 
 
-class BlocksDeck(Deck, kw_only=True):
+class BlocksDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(t_end=1e-3)
     regrid: Regrid = Regrid()
     title: key(str, "a line for the summary") = ""
@@ -368,6 +360,8 @@ class Blocks(Problem):
             if names.count(name) > 1:
                 raise BadInput(f"deck: {names.count(name)} blocks are called {name!r}")
         self.materials = {block.name: find_block_material(block) for block in deck.block}
+        tables = {block.name: block for block in deck.block}
+        self.laws = find_laws(deck, self.materials, tables)
         deck.regrid.check_weight()
         across = deck.geometry == "axisymmetric" and deck.gravity[1]
         deck.refuse(across, "gravity", "in axisymmetric flow y is the radius; it is along x")
@@ -404,12 +398,13 @@ class Blocks(Problem):
                 "contacts of free surfaces do not go on across periodic sides: what meets only "
                 "beyond one passes through; make the period longer"
             )
-        if any("friction" in side.options or "weld" in side.options for side in surfaces):
+        holds = any("friction" in side.options or "weld" in side.options for side in surfaces)
+        if holds and any(laws.strength is None for laws in self.laws.values()):
             told.append(
-                "friction and welds hold the first row of cells along a contact alone, as "
+                "friction and welds hold the first row of cells along a contact alone, where "
                 "materials have no strength: the momentum that passes falls with the size of cells"
             )
-        return told
+        return told + list_fluids(self.laws)
 
     def build(self) -> Simulation:
         deck = self.deck
@@ -465,7 +460,7 @@ class Blocks(Problem):
             for field in table.carried
         ]
         options = {"material": label, "limiter": self.deck.limiter, "carried": carried}
-        options["strength"] = find_strength(table, material, where)
+        options |= self.laws[table.name].options
         block = Block(table.name, material.eos, nodes, *state, **options)
         for side in table.side:
             if side.kind in LINKED.values():
@@ -515,21 +510,6 @@ def find_block_material(block: BlockTable) -> Material:
         return find_material(block.material)
     except BadInput as error:
         raise BadInput(f"{where}: {error}") from None
-
-
-def find_strength(block: BlockTable, material: Material, where: str) -> StrengthLaw | None:
-    """The law of strength that a block asks for, None for a fluid; BadInput where it has none."""
-    if isinstance(block.strength, dict):
-        return make_strength(f"{where}, strength", block.strength, material.eos, material.rho0)
-    if not block.strength:
-        return None
-    check_solid(f"{where}, strength", material.eos)
-    if material.strength is None:
-        raise BadInput(
-            f"{where}: strength = true, and its material has no strength_law; give a table such "
-            'as {law = "perfect", shear_modulus = ..., yield_strength = ...} [Pa]'
-        )
-    return material.strength
 
 
 def collect_options(side: BlockSide, where: str) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import EquationOfState, IdealGas, StiffenedGas
 from shockgrid.hydro.eos.conversion import compute_conserved, find_held
-from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.eos.materials import Material, find_material
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.step import take_step
@@ -55,15 +55,19 @@ class Fluid(DeckTable, kw_only=True):
         """A gas does; a material brings its own density."""
         return "material" not in table
 
-    def make(self) -> tuple[EquationOfState, float]:
-        """Equation of state and density at the start."""
+    def find(self) -> Material:
+        """The material of the library, or that of the gas."""
         if self.material is not None:
-            found = find_material(self.material)
-            return found.eos, self.rho or found.rho0
+            return find_material(self.material)
         eos = StiffenedGas(self.gamma, self.p_inf) if self.p_inf else IdealGas(self.gamma)
         if self.rho is None:
             raise BadInput("deck: a gas without `material` needs its density `rho`")
-        return eos, self.rho
+        return Material(eos, self.rho, "the deck")
+
+    def make(self) -> tuple[EquationOfState, float]:
+        """Equation of state and density at the start."""
+        found = self.find()
+        return found.eos, self.rho or found.rho0
 
 
 def make_plane_grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:

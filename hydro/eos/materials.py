@@ -30,7 +30,8 @@ class Material:
 
     names: other names by which it is found; strength: of a solid, None for fluids and for solids
     whose strength is not known.  strengths: all laws that are known for it, the first being
-    `strength`, and strength_sources: where the numbers of each come from.
+    `strength`, and strength_sources: where the numbers of each come from.  spall: the table of the
+    law by which it opens under tension, if one is known, and spall_source.
     """
 
     eos: EquationOfState
@@ -40,6 +41,8 @@ class Material:
     strength: StrengthLaw | None = None
     strengths: tuple[StrengthLaw, ...] = ()
     strength_sources: tuple[str, ...] = ()
+    spall: Mapping[str, object] | None = None
+    spall_source: str = ""
 
 
 def _hint(name: str, known) -> str:
@@ -63,6 +66,7 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
     names = tuple(numbers.pop("names", ()))
     heat_capacity = numbers.pop("heat_capacity", None)
     strength_tables = numbers.pop("strength_law", [])
+    spall = numbers.pop("spall_law", None)
     rho0 = numbers["rho0"]
     if "rho0" not in _list_parameters(eos_class):
         del numbers["rho0"]
@@ -82,7 +86,21 @@ def make_material(where: str, table: dict, folder: Path) -> Material:
             sources.append(str(law_table.pop("source", source)))
         laws.append(make_strength(f"{where}, strength_law", law_table, eos, float(rho0)))
     first = laws[0] if laws else None
-    return Material(eos, float(rho0), source, names, first, tuple(laws), tuple(sources))
+    spall_source = ""
+    if spall is not None:
+        spall = dict(spall)
+        spall_source = str(spall.pop("source", source))
+    return Material(
+        eos,
+        float(rho0),
+        source,
+        names,
+        first,
+        tuple(laws),
+        tuple(sources),
+        spall,
+        spall_source,
+    )
 
 
 def choose_strength(where: str, material: Material, choice: object) -> StrengthLaw | None:
@@ -93,6 +111,7 @@ def choose_strength(where: str, material: Material, choice: object) -> StrengthL
     """
     if choice is None or choice is False:
         return None
+    check_solid(where, material.eos)
     if isinstance(choice, Mapping):
         return make_strength(where, choice, material.eos, material.rho0)
     kinds = [law.kind for law in material.strengths]
@@ -149,6 +168,10 @@ def _find_mistakes(table: dict) -> Iterator[str]:
     wanted = _list_parameters(eos_class)
     for key, value in table.items():
         if key in ("eos", "source", "heat_capacity", "strength_law"):
+            continue
+        if key == "spall_law":
+            if not isinstance(value, dict):
+                yield f"spall_law is {value!r}; a table with law and parameters is wanted"
             continue
         if key == "names":
             if not isinstance(value, list) or not all(isinstance(one, str) for one in value):

@@ -34,7 +34,6 @@ from shockgrid.problems.conical_target.layout import MATERIALS, Layout, Ripple
 from shockgrid.problems.deck import (
     MOST_CELLS,
     NONE,
-    Deck,
     DeckTable,
     Regrid,
     RunControl,
@@ -43,6 +42,7 @@ from shockgrid.problems.deck import (
 )
 from shockgrid.problems.problem import Problem, check_memory, find_crossing
 from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.solids import SolidDeck, find_laws
 
 Touch = Literal["joined", "sliding"]
 
@@ -67,7 +67,7 @@ class Contact(DeckTable, kw_only=True):
     cone: key(Touch, "the cone's side and what is around it") = "joined"
 
 
-class ConicalTargetDeck(Deck, kw_only=True):
+class ConicalTargetDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(t_end=5e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     cells: key(int, "cells from the axis to the shell", ge=16, le=MOST_CELLS) = 48
@@ -117,6 +117,7 @@ class ConicalTarget(seen.Results, Problem):
         }
         for name, material in self.materials.items():
             check_solid(name, getattr(deck, name), material)
+        self.laws = find_laws(deck, self.materials)
         for low, high, what in (
             ("tip", "base", "the cone narrows from its base to its tip"),
             ("base", "radius", "there must be lead between the cone and the shell"),
@@ -165,10 +166,12 @@ class ConicalTarget(seen.Results, Problem):
         deck = self.deck
         blocks = {}
         for name, nodes in self.make_grids().items():
-            material = self.materials[MATERIALS[name]]
+            body = MATERIALS[name]
+            material = self.materials[body]
             speed = deck.speed if name == "impactor" else 0.0
             state = material.rho0, speed, 0.0, 0.0
-            blocks[name] = Block(name, material.eos, nodes, *state, material=MATERIALS[name])
+            options = {"material": body, **self.laws[body].options}
+            blocks[name] = Block(name, material.eos, nodes, *state, **options)
         return self.simulate(
             blocks.values(),
             self.layout.connect(blocks),

@@ -24,6 +24,7 @@ from shockgrid.problems.pictures import (
 from shockgrid.problems.problem import Report, Row, fit_slope, reduce_between
 from shockgrid.problems.references.hugoniot import caution_fit, shock_to_pressure
 from shockgrid.problems.references.shock_polars import CrossedLine
+from shockgrid.problems.solids import list_fluids
 from shockgrid.regrid.curves import compute_arc_lengths
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import trace_outline
@@ -311,9 +312,9 @@ class Results:
         return Report(head, rows)
 
     def cautions(self, history=None) -> list[str]:
-        """Materials beyond their Hugoniots at the impact."""
+        """Materials beyond their Hugoniots at the impact, fluids among solids."""
         deck = self.deck
-        return [
+        beyond = [
             caution
             for part in ("impactor", "shell")
             if part in self.materials
@@ -321,6 +322,7 @@ class Results:
                 getattr(deck, part), self.materials[part].eos, self.impact[0]
             )
         ]
+        return beyond + list_fluids(self.laws)
 
     def figures(self):
         return {n: draw for n, draw in super().figures().items() if n != "ripple" or self.ripple}

@@ -19,7 +19,6 @@ import msgspec
 
 from shockgrid.problems.deck import (
     MOST_CELLS,
-    Deck,
     DeckTable,
     Limiter,
     Regrid,
@@ -29,6 +28,7 @@ from shockgrid.problems.deck import (
 )
 from shockgrid.problems.initial_states import Fluid
 from shockgrid.problems.interface_instability.line import Mode, Spectrum
+from shockgrid.problems.solids import SolidDeck
 from shockgrid.regrid.errors import BadInput
 
 LONGEST_WAVELENGTHS = 1e4  # wavelengths in a length
@@ -50,9 +50,13 @@ class LineMotion(DeckTable, kw_only=True):
         float | None, "smoothing length [m]. If left out: 0.75 of a cell", ge=0, le=1e12
     ) = None
     tension: key(float, "surface tension of the interface [N/m]", ge=0, le=1e20) = 0.0
+    contact: key(
+        Literal["sliding", "bonded"],
+        "solids on both sides slip along each other, or stick together",
+    ) = "sliding"
 
 
-class InterfaceDeck(Deck, kw_only=True):
+class InterfaceDeck(SolidDeck, kw_only=True):
     """Deck of `interface-instability`; the defaults are the 1:3 gas at Mach 1.5."""
 
     runtime = ("kct_end",)

@@ -12,7 +12,7 @@ Use any consistent units: SI for the materials of the library, or rho = p = 1.
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -66,6 +66,7 @@ from shockgrid.problems.references.hugoniot import (
     shock_with_particle_speed,
 )
 from shockgrid.problems.references.linear_growth import LinearGrowth, compute_linear_growth
+from shockgrid.problems.solids import find_laws
 from shockgrid.regrid.compilation.first_calls import is_interpreting
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.quality import find_bad_cells
@@ -111,6 +112,7 @@ class InterfaceInstability(Results, Problem):
             self.t_unit = "1"  # the pressure ahead of the shock is the unit
         self.eos_first, self.rho_first = deck.first.make()
         self.eos_second, self.rho_second = deck.second.make()
+        self.laws = find_laws(deck, {"first": deck.first.find(), "second": deck.second.find()})
         self.k = 2.0 * math.pi / deck.wavelength
         if deck.mach is not None and deck.shock_pressure is not None:
             raise BadInput("deck: give `mach` or `shock_pressure`, not both")
@@ -160,9 +162,21 @@ class InterfaceInstability(Results, Problem):
             deck.refuse(self.t_end <= 0.0, "kct_end", wanted)
 
     def _check_handover(self) -> None:
-        """Raise BadInput for keys that one grid of both materials cannot have."""
+        """Raise BadInput for keys that one grid of both materials cannot have, and for bonds of
+        fluids."""
         deck = self.deck
         name = "start" if self.is_captured else "handover"
+        solids = [body for body, laws in self.laws.items() if laws.strength is not None]
+        deck.refuse(
+            deck.line.contact == "bonded" and len(solids) < 2,
+            "line.contact",
+            "only solids stick together; give both materials a `strength`",
+        )
+        deck.refuse(
+            self.may_hand_over and solids,
+            "strength",
+            f"{name} lays both materials on one grid, whose cells bear no shear",
+        )
         deck.refuse(
             self.may_hand_over and deck.refine,
             "refine",
@@ -574,13 +588,23 @@ class InterfaceInstability(Results, Problem):
         far wall or between open ends; their links, and what makes their regridders."""
         deck = self.deck
         first, second = blocks = [
-            Block(name, eos, grid, *state, material=name, limiter=deck.limiter)
+            Block(
+                name,
+                eos,
+                grid,
+                *state,
+                material=name,
+                limiter=deck.limiter,
+                **self.laws[name].options,
+            )
             for name, eos, grid, state in zip(
                 ("first", "second"), (self.eos_first, self.eos_second), grids, states, strict=True
             )
         ]
-        tension = deck.line.tension
-        links = [join("interface", (first, "i_max"), (second, "i_min"), tension=tension)]
+        contact: dict[str, Any] = {"tension": deck.line.tension}
+        if deck.line.contact == "bonded":
+            contact["bonded"] = True
+        links = [join("interface", (first, "i_max"), (second, "i_min"), **contact)]
         self._bound_ends((first, None), (second, None))
         if deck.sides == "periodic":
             links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]

@@ -28,7 +28,6 @@ from shockgrid.hydro.eos.materials import find_material
 from shockgrid.hydro.links import join, slide
 from shockgrid.problems.deck import (
     MOST_CELLS,
-    Deck,
     DeckTable,
     Regrid,
     RunControl,
@@ -51,6 +50,7 @@ from shockgrid.problems.references.shock_polars import (
     release_driven_plate,
     solve_collision,
 )
+from shockgrid.problems.solids import SolidDeck, find_laws
 from shockgrid.regrid.curves import arc_spacing, clustered_spacing, meeting_laws
 
 Cells = Annotated[int, Meta(ge=1, le=MOST_CELLS)]
@@ -74,7 +74,7 @@ class Drive(DeckTable, kw_only=True):
     thickness: key(float, "of the flyer [m]", ge=1e-9, le=1e3) = 5e-3
 
 
-class PlateOnWedgeDeck(Deck, kw_only=True):
+class PlateOnWedgeDeck(SolidDeck, kw_only=True):
     """Deck of `plate-on-wedge`; the default is the paper's scenario, its sizes are ours."""
 
     run: RunControl = RunControl(cfl=0.8)
@@ -122,6 +122,10 @@ class PlateOnWedge(Results, Problem):
         self.materials = {"plate": solid, "wedge": wedge}
         for name, material in self.materials.items():
             check_solid(name, getattr(deck, name), material)
+        self.solids = dict(self.materials)
+        if deck.drive.kind == "flyer":
+            self.solids["flyer"] = find_material(deck.drive.material)
+        self.laws = find_laws(deck, self.solids)
         ni, nj = deck.cells
         self.contact = round(OVER_EDGE * ni)
         parts = self.contact, ni - self.contact, nj  # on the wedge, beyond it, across
@@ -271,10 +275,10 @@ class PlateOnWedge(Results, Problem):
             times, parts = (np.array(column) for column in zip(*drive.history, strict=True))
             strength = lambda t: float(np.interp(t, times, parts))  # noqa: E731
         speeds = {"plate": -drive.speed if drive.kind == "moving" else 0.0, "flyer": -drive.speed}
-        solids = {**self.materials, "flyer": find_material(drive.material)}
         for name, nodes in grids.items():
-            state = solids[name].rho0, 0.0, speeds.get(name, 0.0), 0.0
-            blocks.append(Block(name, solids[name].eos, nodes, *state))
+            solid = self.solids[name]
+            state = solid.rho0, 0.0, speeds.get(name, 0.0), 0.0
+            blocks.append(Block(name, solid.eos, nodes, *state, **self.laws[name].options))
         plate, wedge, *flyer = blocks
         edge = (wedge, "j_max", 0, self.on_edge)
         face = (wedge, "j_max", self.on_edge, None)

@@ -24,6 +24,7 @@ from shockgrid.problems.pictures import (
 from shockgrid.problems.problem import Report, Row
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.shock_polars import compute_jet_speed
+from shockgrid.problems.solids import list_fluids
 from shockgrid.regrid.sides import trace_outline
 
 # thousandths of A's path behind A between which pressures are averaged
@@ -415,7 +416,7 @@ class Results:
             for name, body in self.materials.items()
             for caution in caution_fit(f"the {name}", body.eos, p)
         ]
-        return beyond + self.caution_cells()
+        return beyond + self.caution_cells() + list_fluids(self.laws)
 
     def caution_cells(self) -> list[str]:
         """Too few cells close to the critical angle."""

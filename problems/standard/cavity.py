@@ -22,14 +22,15 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos.materials import find_material, find_name
-from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, VoidFill, key
+from shockgrid.problems.deck import MOST_CELLS, Regrid, RunControl, VoidFill, key
 from shockgrid.problems.initial_states import lay_rays, put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
 from shockgrid.problems.problem import Problem, Report, Row, find_most, find_time, measure_below
 from shockgrid.problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
+from shockgrid.problems.solids import SolidDeck, find_laws
 
 
-class CavityDeck(Deck, kw_only=True):
+class CavityDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(cfl=0.8)
     regrid: Regrid = Regrid(epsilon=3e-2)
     material: key(str, "of the body, name or FILE.toml:NAME") = "Al1100"
@@ -53,6 +54,7 @@ class Cavity(Problem):
     def __init__(self, deck: CavityDeck):
         super().__init__(deck)
         self.material = find_material(deck.material)
+        self.laws = find_laws(deck, {"metal": self.material})["metal"]
         self.curved = deck.geometry == "axisymmetric"
         eos = self.material.eos
         rho = self.material.rho0
@@ -74,7 +76,8 @@ class Cavity(Problem):
         (nodes, (_, first, second, last)) = self.lay()
         state = (self.material.rho0, 0.0, 0.0, 0.0)
         material = find_name(deck.material)
-        block = Block("metal", self.material.eos, nodes, *state, material=material)
+        options = {"material": material, **self.laws.options}
+        block = Block("metal", self.material.eos, nodes, *state, **options)
         put(block, "j_min", "free-surface")
         put(block, "j_max", "piston", 0, first, velocity=(deck.speed, 0.0))
         put(block, "j_max", "free-surface", second, last)

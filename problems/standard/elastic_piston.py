@@ -24,7 +24,7 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
-from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import choose_even_dumps
 from shockgrid.problems.problem import (
@@ -39,7 +39,15 @@ from shockgrid.problems.problem import (
     reduce_between,
 )
 from shockgrid.problems.references.elastic_plastic import compute_piston
-from shockgrid.problems.solids import SolidMaterial, Strength, find_solid, find_stress, idealise
+from shockgrid.problems.solids import (
+    SolidDeck,
+    SolidMaterial,
+    Strength,
+    find_laws,
+    find_solid_material,
+    find_stress,
+    idealise,
+)
 
 PRECURSOR_WAY_PART = 0.9  # of the length that the first front has passed at the end
 LATE_PART = 0.4  # of the run, in which speeds of fronts are measured
@@ -55,7 +63,7 @@ def make_law() -> dict:
     return {"law": "perfect", "shear_modulus": 27.6e9, "yield_strength": 0.3e9}
 
 
-class ElasticPistonDeck(Deck, kw_only=True):
+class ElasticPistonDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(cfl=0.8)
     regrid: Regrid = Regrid()
     material: SolidMaterial = "Al2024"
@@ -83,7 +91,9 @@ class ElasticPiston(Problem):
 
     def __init__(self, deck: ElasticPistonDeck):
         super().__init__(deck)
-        self.material, self.law = find_solid("material", deck.material, deck.strength)
+        self.material = find_solid_material("material", deck.material)
+        self.laws = find_laws(deck, {"solid": self.material})["solid"]
+        self.law = self.laws.strength
         self.solid = idealise(self.material, self.law)
         with deck.blame("speed", "no shock of this material is so fast"):
             self.waves = compute_piston(self.solid, deck.speed)
@@ -114,7 +124,7 @@ class ElasticPiston(Problem):
             0.0,
             0.0,
             limiter=deck.limiter,
-            strength=self.law,
+            **self.laws.options,
         )
         put(block, "i_min", "piston", velocity=(deck.speed, 0.0))
         put_walls(block)

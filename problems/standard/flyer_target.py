@@ -25,15 +25,16 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos.materials import find_material
-from shockgrid.problems.deck import MOST_CELLS, Deck, DeckTable, Regrid, RunControl, VoidFill, key
+from shockgrid.problems.deck import MOST_CELLS, Regrid, RunControl, VoidFill, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import draw_columns
 from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
 from shockgrid.problems.references.exact_flows import compute_plate_impact, compute_window_impact
 from shockgrid.problems.references.hugoniot import caution_fit
+from shockgrid.problems.solids import BodyTable, SolidDeck, find_laws, list_fluids
 
 
-class PlateTable(DeckTable, kw_only=True):
+class PlateTable(BodyTable, kw_only=True):
     material: key(str, "name of a material, or FILE.toml:NAME") = "Cu"
     thickness: key(float, "[m]", ge=1e-9, le=1e3) = 2e-3
     cells: key(int, "cells across it", ge=2, le=MOST_CELLS) = 160
@@ -50,7 +51,7 @@ LARGE_LENGTH = 0.2  # of a plate or a gap [m]: more may be meant in mm
 PLATES = PlateTable(material="Al1100", thickness=1e-3, cells=100), PlateTable(gap=1e-4)
 
 
-class FlyerTargetDeck(Deck, kw_only=True):
+class FlyerTargetDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(t_end=1.6e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     speed: key(float, "of the first plate [m/s]", ge=1e-12, le=1e5) = 1000.0
@@ -90,6 +91,8 @@ class FlyerTarget(Problem):
             sizes = deck.speed, second.thickness, more[0].thickness
             self.window = compute_window_impact(self.theory, *self.materials[:3], *sizes)
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
+        bodies = dict(zip(self.names, self.materials, strict=True))
+        self.laws = find_laws(deck, bodies, dict(zip(self.names, deck.plates, strict=True)))
 
     def list_boxes(self):  # cells 8 times as high as the thinnest: square ones halve the time step
         rows = self.deck.rows
@@ -111,7 +114,8 @@ class FlyerTarget(Problem):
         bodies = zip(self.make_grids().items(), self.materials, bonds, strict=True)
         for (name, nodes), material, pair in bodies:
             state = material.rho0, 0.0 if blocks else deck.speed, 0.0, 0.0
-            blocks.append(Block(name, material.eos, nodes, *state, material=name))
+            options = {"material": name, **self.laws[name].options}
+            blocks.append(Block(name, material.eos, nodes, *state, **options))
             for side, bond in zip(("i_min", "i_max"), pair, strict=True):
                 put(blocks[-1], side, "free-surface", bond=bond)
             put_walls(blocks[-1])
@@ -135,7 +139,7 @@ class FlyerTarget(Problem):
         hit = dict(zip((plate.material for plate in deck.plates), self.materials, strict=True))
         for name in dict.fromkeys(plate.material for plate in deck.plates[:2]):
             cautions += caution_fit(name, hit[name].eos, self.theory.pressure)
-        return cautions
+        return cautions + list_fluids(self.laws)
 
     def measure(self, evolution) -> dict[str, float]:
         row = {}

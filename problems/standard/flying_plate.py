@@ -26,7 +26,7 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
-from shockgrid.problems.deck import MOST_CELLS, NONE, Deck, Limiter, Output, Regrid, RunControl, key
+from shockgrid.problems.deck import MOST_CELLS, Limiter, Output, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import make_panels
 from shockgrid.problems.problem import (
@@ -38,11 +38,11 @@ from shockgrid.problems.problem import (
 )
 from shockgrid.problems.references.elastic_plastic import compute_piston
 from shockgrid.problems.solids import (
+    SolidDeck,
     SolidMaterial,
-    Spall,
     Strength,
-    find_solid,
-    find_spall,
+    find_laws,
+    find_solid_material,
     idealise,
 )
 from shockgrid.problems.standard.elastic_piston import make_law
@@ -89,13 +89,12 @@ def make_material() -> dict:
     }
 
 
-class FlyingPlateDeck(Deck, kw_only=True):
+class FlyingPlateDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(t_end=11.5e-6, cfl=0.8)
     output: Output = Output(times=[5e-6])
     regrid: Regrid = Regrid()
     material: SolidMaterial = msgspec.field(default_factory=make_material)
     strength: Strength = msgspec.field(default_factory=make_law)
-    spall: Spall = NONE
     speed: key(float, "of the flyer [m/s]", ge=1e-6, le=1e5) = 800.0
     flyer: key(float, "thickness of the flyer [m]", ge=1e-9, le=1e3) = 5e-3
     target: key(float, "thickness of the target [m]", ge=1e-9, le=1e3) = 45e-3
@@ -122,9 +121,10 @@ class FlyingPlate(Problem):
 
     def __init__(self, deck: FlyingPlateDeck):
         super().__init__(deck)
-        self.material, self.law = find_solid("material", deck.material, deck.strength)
+        self.material = find_solid_material("material", deck.material)
+        self.laws = find_laws(deck, {"plates": self.material})["plates"]
+        self.law = self.laws.strength
         self.solid = idealise(self.material, self.law)
-        self.spall = find_spall(deck.spall)
         with deck.blame("speed", "no shock of this material is so fast"):
             self.waves = compute_piston(self.solid, 0.5 * deck.speed)
         self.units = type(self).units | {
@@ -169,7 +169,7 @@ class FlyingPlate(Problem):
         u = np.zeros((self.cells, deck.rows))
         u[: deck.flyer_cells] = deck.speed
         state = self.material.rho0, u, 0.0, 0.0
-        options = {"limiter": deck.limiter, "strength": self.law, "spall": self.spall}
+        options = {"limiter": deck.limiter, **self.laws.options}
         block = Block("plates", self.material.eos, nodes, *state, **options)
         for side in ("i_min", "i_max"):
             put(block, side, "free-surface")

@@ -30,12 +30,19 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
-from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
 from shockgrid.problems.problem import BlockPlan, Problem, Report, Row
 from shockgrid.problems.references.elastic_plastic import compute_piston, compute_release
-from shockgrid.problems.solids import SolidMaterial, Strength, find_solid, idealise
+from shockgrid.problems.solids import (
+    SolidDeck,
+    SolidMaterial,
+    Strength,
+    find_laws,
+    find_solid_material,
+    idealise,
+)
 
 USUAL_CONSTANT = 0.29  # C of [Piriz2008]
 ARRESTS_UNTIL_END = 2.5  # the run lasts so many times the estimate of the time to the arrest
@@ -61,7 +68,7 @@ def make_law() -> dict:
     return {"law": "perfect", "shear_modulus": 47.7e9, "yield_strength": 0.2e9}
 
 
-class RippledSurfaceDeck(Deck, kw_only=True):
+class RippledSurfaceDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(cfl=0.8)
     regrid: Regrid = Regrid()
     material: SolidMaterial = msgspec.field(default_factory=make_copper)
@@ -87,7 +94,9 @@ class RippledSurface(Problem):
 
     def __init__(self, deck: RippledSurfaceDeck):
         super().__init__(deck)
-        self.material, self.law = find_solid("material", deck.material, deck.strength)
+        self.material = find_solid_material("material", deck.material)
+        self.laws = find_laws(deck, {"metal": self.material})["metal"]
+        self.law = self.laws.strength
         self.solid = idealise(self.material, self.law)
         self.k = 2.0 * math.pi / deck.wavelength
         self.amplitude = deck.ka0 / self.k
@@ -170,7 +179,7 @@ class RippledSurface(Problem):
             below = deck.speed * np.exp(self.k * (x - self.length))
             u = below * np.cos(self.k * y)
             v = -below * np.sin(self.k * y)
-        options = {"limiter": deck.limiter, "strength": self.law}
+        options = {"limiter": deck.limiter, **self.laws.options}
         block = Block("metal", self.material.eos, nodes, self.material.rho0, u, v, 0.0, **options)
         put(block, "i_max", "free-surface")
         if deck.start == "shock":

@@ -22,12 +22,19 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
-from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
 from shockgrid.problems.problem import Report, Row, get_last
 from shockgrid.problems.references.collapsing_shells import PlasticShell
-from shockgrid.problems.solids import SolidMaterial, Strength, find_solid, idealise
+from shockgrid.problems.solids import (
+    SolidDeck,
+    SolidMaterial,
+    Strength,
+    find_laws,
+    find_solid_material,
+    idealise,
+)
 from shockgrid.regrid.errors import BadInput
 
 DIMENSIONS_OF_SHAPES = {"cylindrical": 2, "spherical": 3}
@@ -51,7 +58,7 @@ def make_law() -> dict:
     return {"law": "perfect", "shear_modulus": 151.9e9, "yield_strength": 0.33e9}
 
 
-class ShellDeck(Deck, kw_only=True):
+class ShellDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(cfl=0.8)
     regrid: Regrid = Regrid()
     geometry: key(Literal["cylindrical", "spherical"], "shape of the shell") = "cylindrical"
@@ -79,7 +86,9 @@ class CollapsingShell(RadialProblem):
 
     def __init__(self, deck: ShellDeck):
         super().__init__(deck, DIMENSIONS_OF_SHAPES[deck.geometry])
-        self.material, law = find_solid("material", deck.material, deck.strength)
+        self.material = find_solid_material("material", deck.material)
+        self.laws = find_laws(deck, {"shell": self.material})["shell"]
+        law = self.laws.strength
         if law is None:
             raise BadInput("deck: strength is false; a shell without strength does not stop")
         self.law = law
@@ -117,7 +126,7 @@ class CollapsingShell(RadialProblem):
         radius = np.hypot(*centres)
         inwards = -self.speed * (deck.inner / radius) ** self.shell.power / radius
         u, v = inwards * centres
-        options = {"limiter": deck.limiter, "strength": self.law}
+        options = {"limiter": deck.limiter, **self.laws.options}
         state = self.material.rho0, u, v, 0.0
         block = Block("shell", self.material.eos, nodes, *state, **options)
         put(block, "i_min", "free-surface")

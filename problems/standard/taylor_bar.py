@@ -26,11 +26,17 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos.temperature import REST_TEMPERATURE
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
-from shockgrid.problems.deck import MOST_CELLS, Deck, DeckTable, Limiter, Regrid, RunControl, key
+from shockgrid.problems.deck import MOST_CELLS, DeckTable, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
 from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_most, get_last
-from shockgrid.problems.solids import SolidMaterial, Strength, find_solid
+from shockgrid.problems.solids import (
+    SolidDeck,
+    SolidMaterial,
+    Strength,
+    find_laws,
+    find_solid_material,
+)
 from shockgrid.regrid.errors import BadInput
 
 USUAL_STRAIN = 0.1
@@ -70,7 +76,7 @@ def make_law() -> dict:
     }
 
 
-class TaylorBarDeck(Deck, kw_only=True):
+class TaylorBarDeck(SolidDeck, kw_only=True):
     run: RunControl = RunControl(t_end=80e-6, cfl=0.8)
     regrid: Regrid = Regrid()
     material: SolidMaterial = msgspec.field(default_factory=make_material)
@@ -90,7 +96,9 @@ class TaylorBar(Problem):
 
     def __init__(self, deck: TaylorBarDeck):
         super().__init__(deck)
-        self.material, law = find_solid("material", deck.material, deck.strength)
+        self.material = find_solid_material("material", deck.material)
+        self.laws = find_laws(deck, {"bar": self.material})["bar"]
+        law = self.laws.strength
         if law is None:
             raise BadInput("deck: strength is false; a bar without strength never comes to rest")
         self.law = law
@@ -104,7 +112,7 @@ class TaylorBar(Problem):
     def build(self):
         deck = self.deck
         state = self.material.rho0, -deck.speed, 0.0, 0.0
-        options = {"limiter": deck.limiter, "strength": self.law}
+        options = {"limiter": deck.limiter, **self.laws.options}
         block = Block("bar", self.material.eos, self.make_grids()["bar"], *state, **options)
         for side in ("i_max", "j_max"):
             put(block, side, "free-surface")

@@ -98,16 +98,18 @@ def describe_materials(name: str | None = None) -> str:
 
     if name is not None:
         return describe_material(find_name(name), find_material(name))
-    head = f"{'material':18}{'kind':18}{'density':>12}{'c0':>12}{'s':>7}{'HEL':>11}   {'source':18}"
-    lines = [f"{head}other names"]
+    head = f"{'material':18}{'kind':18}{'density':>12}{'c0':>12}{'s':>7}{'HEL':>11}{'spall':>10}"
+    lines = [f"{head}   {'source':18}other names"]
     for one, material in read_materials(LIBRARY).items():
         density = f"{material.rho0:g} kg/m3"
         line = f"{one:18}{material.eos.kind:18}{density:>12}{describe_hugoniot(material.eos)}"
-        line += f"{describe_elastic_limit(material):>11}   {shorten_source(material.source):18}"
+        line += f"{describe_elastic_limit(material):>11}{describe_spall(material):>10}"
+        line += f"   {shorten_source(material.source):18}"
         lines.append(f"{line}{', '.join(material.names)}".rstrip())
     legend = (
         "c0, s: of a straight Hugoniot, Us = c0 + s up; HEL: Hugoniot elastic limit, the stress of "
-        "the strongest elastic shock, of materials with a law of strength"
+        "the strongest elastic shock, of materials with a law of strength; spall: the tension at "
+        "which voids open"
     )
     usage = "shockgrid materials NAME: its parameters and their source"
     return "\n".join([*lines, "", *textwrap.wrap(legend, 90), usage])
@@ -128,6 +130,10 @@ def describe_material(name: str, material: Any) -> str:
         own = {law.keys.get(key, key): value for key, value in list_numbers(law).items()}
         lines += describe_numbers(own)
         lines += ["", *textwrap.wrap(f"source: {' '.join(source.split())}", 90)]
+    if material.spall is not None:
+        own = dict(material.spall)
+        lines += ["", f"spall law {own.pop('law', '?')}", *describe_numbers(own)]
+        lines += ["", *textwrap.wrap(f"source: {' '.join(material.spall_source.split())}", 90)]
     return "\n".join(lines)
 
 
@@ -160,6 +166,13 @@ def describe_elastic_limit(material: Any, law: Any = None) -> str:
 
     stress = find_elastic_limit(make_solid_at_rest(material, law)).stress
     return f"{1e-9 * stress:.3g} GPa"
+
+
+def describe_spall(material: Any) -> str:
+    """The tension at which voids open, or that of the law of spall; "" where there is none."""
+    law_stress = (material.spall or {}).get("stress")
+    tension = law_stress or getattr(material.eos, "strength", 0.0)
+    return f"{1e-9 * tension:.3g} GPa" if tension > 0.0 else ""
 
 
 def shorten_source(source: str) -> str:

@@ -63,7 +63,7 @@ def test_without_yield_it_is_the_fluid():
 @pytest.mark.parametrize(
     "settings, words",
     [
-        (("material=air", "strength=true"), "no such law of strength"),
+        (("material=air", "strength=true"), "strength is for solids"),
         (("material=diamond", "strength=true"), "it has none"),
         (("strength='glue'",), "no such law of strength, 'glue'"),
         (("strength={ law = 'perfect', shear_modulus = 1e9 }",), "needs yield_strength"),

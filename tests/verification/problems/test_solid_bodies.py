@@ -1,0 +1,144 @@
+"""Keys `strength` and `spall` of decks with bodies: one mechanism for all of them."""
+
+import numpy as np
+import pytest
+
+from builders import march_measured
+from shockgrid.hydro.strength.spall import CochranBanner, ConstantSpall
+from shockgrid.regrid.errors import BadInput
+from shockgrid.runs.deck.reading import read_deck
+
+WEAK = "{ law = 'perfect', shear_modulus = 1.0, yield_strength = 0.0 }"
+FIRM = "{ law = 'perfect', shear_modulus = 30e9, yield_strength = 1e9 }"
+CAVITY = "cavity", ("cells=24", "width=2", "behind=3")
+FLYER = "flyer-target", ("plates.0.cells=25", "plates.1.cells=40")
+PLATE = "plate-on-wedge", ("cells=[30,9]", "angle=10", "drive.kind=moving", "drive.speed=1500")
+METALS = "interface-instability-al-ss304", ("cells=16", "kct_end=4", "handover=false")
+TARGET = "conical-target", ("cells=16", "run.t_end=1.2e-6", "filling=Cu")
+CONES = *TARGET[1], "cover=0.016"
+
+
+def march(deck, *settings):
+    """A problem, its history and the rows of its report by name."""
+    problem = read_deck(deck, settings).make_problem()
+    history = march_measured(problem, problem.build())
+    return problem, history, {row.name: row.computed for row in problem.report(history).rows}
+
+
+@pytest.mark.parametrize(
+    "deck, columns",
+    [
+        (FLYER, {"pressure": 1e-3, "free": 3e-3}),
+        (CAVITY, {"arrival": 2e-3, "near_speed": 0.02}),
+        pytest.param(PLATE, {"contact_speed": 5e-3, "pressure": 0.02}, marks=pytest.mark.slow),
+        (METALS, {"interface_speed": 1e-4}),
+        pytest.param(
+            (TARGET[0], CONES), {"impact": 0.03, "peak_impactor": 0.03}, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_strength_that_goes_to_nothing_leaves_the_fluid(deck, columns):
+    # a fluid has steeper slopes: fronts of the null test are as far apart as limiters make them
+    name, settings = deck
+    _, _, fluid = march(name, *settings)
+    _, _, weak = march(name, *settings, f"strength={WEAK}")
+    for column, tolerance in columns.items():
+        assert weak[column] == pytest.approx(fluid[column], rel=tolerance), column
+
+
+def test_a_rippled_contact_of_metals_grows_less_with_strength_and_least_where_bonded():
+    growths = {}
+    for contact, strength in (
+        ("sliding", "false"),
+        ("sliding", WEAK),
+        ("sliding", FIRM),
+        ("bonded", FIRM),
+    ):
+        settings = f"strength={strength}", f"line.contact={contact}"
+        _, history, _ = march(METALS[0], *METALS[1], *settings)
+        growths[contact, strength] = history["amplitude"][-1] - history["amplitude"][0]
+    fluid = growths["sliding", "false"]
+    assert growths["sliding", WEAK] == pytest.approx(fluid, rel=0.02)
+    assert growths["bonded", FIRM] < growths["sliding", FIRM] < 0.98 * fluid
+
+
+def test_bodies_of_a_deck_have_the_laws_that_it_chooses_for_them():
+    laws = read_deck("conical-target", ("strength=true",)).make_problem().laws
+    assert laws["shell"].strength.kind == "steinberg-cochran-guinan"
+    assert laws["filling"].strength is None  # graphite, of which none is known
+    assert all(body.spall is None for body in laws.values())
+
+    chosen = "strength.plate-2=true", "spall.plate-2={law='cochran-banner',stress=1e9,width=1e-5}"
+    problem = read_deck("flyer-target", chosen).make_problem()
+    assert problem.laws["plate-1"].options == {"strength": None, "spall": None}
+    assert isinstance(problem.laws["plate-2"].spall, CochranBanner)
+    assert any("plate-1: without a law of strength" in said for said in problem.cautions())
+
+    # a key of one body counts before that of all
+    own = read_deck("flyer-target", ("strength=true", "plates.0.strength=false")).make_problem()
+    assert own.laws["plate-1"].strength is None
+    assert own.laws["plate-2"].strength is not None
+
+
+def test_spall_of_the_library_is_the_tension_of_the_material():
+    problem = read_deck("cavity", ("strength=true", "spall=true")).make_problem()
+    assert problem.laws.spall == ConstantSpall(problem.material.eos.strength)
+
+
+def test_spall_of_a_material_file_is_its_law(tmp_path):
+    (tmp_path / "own.toml").write_text(
+        "[soft]\neos = 'mie-gruneisen'\nsource = 'made up'\nrho0 = 2700.0\nc0 = 5300.0\ns = 1.34\n"
+        "gruneisen = 2.0\nstrength = 1e10\n"
+        "[soft.strength_law]\nlaw = 'perfect'\nshear_modulus = 27e9\nyield_strength = 3e8\n"
+        "[soft.spall_law]\nlaw = 'cochran-banner'\nstress = 1.1e9\nwidth = 2e-5\n"
+    )
+    settings = f"material={tmp_path / 'own.toml'}:soft", "strength=true", "spall=true"
+    assert read_deck("cavity", settings).make_problem().laws.spall == CochranBanner(1.1e9, 2e-5)
+
+
+def test_a_block_of_a_deck_spalls():
+    # a bar whose halves part breaks between them, where its law says so
+    table = (
+        "{ name = 'bar', cells = [20, 2], p = 0, material = 'Al6061', strength = true, "
+        "spall = { law = 'constant', stress = 4e8 }, u = '50*tanh((x - 0.01)*1e3)', curves = "
+        "{ i_min = [[0,0],[0,2e-3]], i_max = [[0.02,0],[0.02,2e-3]], "
+        "j_min = [[0,0],[0.02,0]], j_max = [[0,2e-3],[0.02,2e-3]] }, "
+        "side = [{ side = 'i_min', kind = 'free-surface' }, { side = 'i_max', kind = "
+        "'free-surface' }, { side = 'j_min', kind = 'wall' }, { side = 'j_max', kind = 'wall' }] }"
+    )
+    problem = read_deck("blocks", (f"block=[{table}]", "run.t_end=1e-6")).make_problem()
+    flow = problem.build()
+    march_measured(problem, flow)
+    damage = flow.blocks[0].cell_fields["damage"]
+    assert 0 < np.count_nonzero(damage > 0.5) < damage.size
+    assert flow.blocks[0].stress.broken_cells > 0
+
+
+@pytest.mark.parametrize(
+    "deck, settings, words",
+    [
+        ("cavity", ("material=air", "strength=true"), "strength is for solids"),
+        ("cavity", ("strength={ law = 'perfect', shear_modulus = 1e9 }",), "needs yield_strength"),
+        (
+            "cavity",
+            ("strength={ law = 'perfect', shear_modulus = 1e9, yield_strength = -1 }",),
+            "yield_strength is -1",
+        ),
+        ("cavity", ("strength={ yield_strength = 1e9 }",), "there is no body 'yield_strength'"),
+        ("cavity", ("spall=true",), "wants a law of strength besides"),
+        ("flyer-target", ("strength.plate-3=true",), "there is no body 'plate-3'"),
+        ("flyer-target", ("strength.plate-1=true", "spall.plate-2=true"), "plate-2 has none"),
+        ("flyer-target", ("strength=true", "spall='soft'"), "true, false or a table is wanted"),
+        ("plate-on-wedge", ("strength='glue'",), "no such law of strength, 'glue'"),
+        ("conical-target", ("strength.cone=true",), "the bodies are impactor, shell"),
+        ("interface-instability", ("strength=true",), "'ideal-gas' is a gas"),
+        ("interface-instability", ("line.contact=bonded",), "only solids stick together"),
+        (METALS[0], ("strength=true", "handover=true"), "whose cells bear no shear"),
+        ("blocks", ("strength=true",), "'ideal-gas' is a gas"),
+        ("blocks", ("block.0.strength=true",), "'ideal-gas' is a gas"),
+    ],
+)
+def test_strength_that_cannot_be_is_said_in_one_sentence(deck, settings, words):
+    with pytest.raises(BadInput, match=words) as caught:
+        read_deck(deck, settings).make_problem()
+    assert "\n" not in str(caught.value)

@@ -178,7 +178,7 @@ def _draw_map(axes: Any, study: Any, name: str) -> None:
 
 def _name_series(one: Series) -> str:
     order = one.refined.order
-    kind = one.refined.kind.removeprefix("error")
+    kind = "" if one.refined.kind == "error" else one.refined.kind
     name_of_order = f"order {order:.2f}" if np.isfinite(order) else kind
     return ", ".join(part for part in (one.words, name_of_order) if part)
 

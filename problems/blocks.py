@@ -364,7 +364,8 @@ class Blocks(Problem):
         self.laws = find_laws(deck, self.materials, tables)
         deck.regrid.check_weight()
         across = deck.geometry == "axisymmetric" and deck.gravity[1]
-        deck.refuse(across, "gravity", "in axisymmetric flow y is the radius; it is along x")
+        if across:
+            raise deck.error("gravity", "in axisymmetric flow y is the radius; it is along x")
         for link in deck.link:
             if link.tension and link.kind == "slide":
                 raise BadInput(f"deck: link: {link.sides}: a sliding contact has no tension")

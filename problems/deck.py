@@ -94,12 +94,11 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
         """Do the keys that this table of a deck leaves out come from the problem's default?"""
         return cls.merges
 
-    def refuse(self, wrong: object, name: str, words: str) -> None:
-        """Raise BadInput about the key `name` (dotted) with its value, where that is `wrong`."""
-        if wrong:
-            value = operator.attrgetter(name)(self)
-            shown = f"{value:g}" if isinstance(value, float) else repr(value)
-            raise BadInput(f"deck: {name} = {shown}; {words}")
+    def error(self, name: str, words: str) -> BadInput:
+        """The error about the key `name` (dotted): its value, and the sentence `words`."""
+        value = operator.attrgetter(name)(self)
+        shown = f"{value:g}" if isinstance(value, float) else repr(value)
+        return BadInput(f"deck: {name} = {shown}; {words}")
 
     @contextlib.contextmanager
     def blame(self, name: str, words: str) -> Iterator[None]:
@@ -107,7 +106,7 @@ class DeckTable(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
         try:
             yield
         except (BadInput, ValueError) as error:
-            self.refuse(True, name, f"{words} ({error})")
+            raise self.error(name, f"{words} ({error})") from error
 
 
 class RunControl(DeckTable, kw_only=True):

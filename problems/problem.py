@@ -282,7 +282,8 @@ class Problem:
     def check_end(self, last: float, words: str) -> None:
         """Raise BadInput if the end time is beyond `last` [s], the time of the event in `words`."""
         wanted = f"at t = {last:g} {words}, the run must end before"
-        self.deck.refuse(self.t_end > last, "run.t_end", wanted)
+        if self.t_end > last:
+            raise self.deck.error("run.t_end", wanted)
 
     def build(self) -> Evolution:
         """The initial state, ready for the first step."""

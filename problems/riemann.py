@@ -267,9 +267,11 @@ class Riemann(Problem):
         self.name = "own states" if deck.left is not None else deck.case
         self.on_line = deck.contact == "on-line"
         two = not self.on_line and case.left_eos != case.right_eos
-        deck.refuse(two, "contact", "the two sides are of different materials; take 'on-line'")
+        if two:
+            raise deck.error("contact", "the two sides are of different materials; take 'on-line'")
         graded = not self.on_line and deck.grading is not None
-        deck.refuse(graded, "grading", "it is for contact = 'on-line'; leave it out")
+        if graded:
+            raise deck.error("grading", "it is for contact = 'on-line'; leave it out")
         self.exact = exact = solve_riemann(case.left_eos, case.left, case.right_eos, case.right)
         if exact.gap:
             parting = case.right[1] - case.left[1]

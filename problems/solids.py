@@ -94,11 +94,10 @@ def find_laws(
     solids = {name: materials[name] for name in materials if strengths[name] is not None}
     own_spalls = {name: table.spall for name, table in tables.items()}
     for_all = not isinstance(deck.spall, Mapping) or "law" in deck.spall
-    deck.refuse(
-        deck.spall and for_all and not solids,
-        "spall",
-        "a law of spall wants a law of strength besides; give `strength`, too",
-    )
+    if deck.spall and for_all and not solids:
+        raise deck.error(
+            "spall", "a law of spall wants a law of strength besides; give `strength`, too"
+        )
     # what is said of all bodies is of the solids among them
     spalling = {
         name: material

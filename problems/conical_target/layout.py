@@ -69,11 +69,11 @@ class Ripple:
         self.wavenumber = 2.0 * math.pi / self.wavelength
         length = self.frame.length
         self.cells_a_wave = deck.cells * deck.cone / deck.radius * self.wavelength / length
-        deck.refuse(
-            self and 3.0 * self.wavelength > length,
-            "ripple_wavelength",
-            f"the cone's side, {length:.4g} m long, must have room for three waves",
-        )
+        if self and 3.0 * self.wavelength > length:
+            raise deck.error(
+                "ripple_wavelength",
+                f"the cone's side, {length:.4g} m long, must have room for three waves",
+            )
 
     def __bool__(self) -> bool:
         return self.amplitude > 0.0
@@ -90,17 +90,17 @@ class Ripple:
         """Raise BadInput for waves of too few of the side's `cells`, or grids that they fold."""
         number = cells * self.wavelength / self.frame.length
         least = LEAST_RIPPLE_CELLS * self.frame.length / cells
-        self.deck.refuse(
-            number < LEAST_RIPPLE_CELLS,
-            "ripple_wavelength",
-            f"that are {number:.3g} cells; give at least {least:.3g} m, or more `cells`",
-        )
+        if number < LEAST_RIPPLE_CELLS:
+            raise self.deck.error(
+                "ripple_wavelength",
+                f"that are {number:.3g} cells; give at least {least:.3g} m, or more `cells`",
+            )
         bad = any(len(find_bad_cells(nodes)) for nodes in grids.values())
-        self.deck.refuse(
-            bad,
-            "ripple_amplitude",
-            "cells beside the cone's side would not be convex; give a smaller one",
-        )
+        if bad:
+            raise self.deck.error(
+                "ripple_amplitude",
+                "cells beside the cone's side would not be convex; give a smaller one",
+            )
 
     @cached_property
     def first_shock(self) -> tuple[float, float]:

@@ -125,12 +125,14 @@ class ConicalTarget(seen.Results, Problem):
             ("base", "cover", "the shell's front must cover the cone's base and more"),
         ):
             most = getattr(deck, high)
-            deck.refuse(getattr(deck, low) > 0.97 * most, low, f"{high} is {most:g} m: {what}")
-        deck.refuse(
-            0.97 * deck.radius < deck.cover < deck.radius,
-            "cover",
-            f"the lead beside it is too thin; give {deck.radius:g} m to close the shell, or less",
-        )
+            if getattr(deck, low) > 0.97 * most:
+                raise deck.error(low, f"{high} is {most:g} m: {what}")
+        if 0.97 * deck.radius < deck.cover < deck.radius:
+            raise deck.error(
+                "cover",
+                "the lead beside it is too thin; "
+                f"give {deck.radius:g} m to close the shell, or less",
+            )
         self.impact = self._match_impact()
         self.ripple = Ripple(deck, self.materials, self.impact)
         self.layout = Layout(deck, self.ripple)
@@ -148,12 +150,13 @@ class ConicalTarget(seen.Results, Problem):
         with deck.blame("speed", "take a slower impactor"):
             hit = solve_riemann(one.eos, (one.rho0, deck.speed, 0.0), two.eos, (two.rho0, 0.0, 0.0))
         limits = [float(solid.eos.sound_speed(solid.rho0, 0.0)) for solid in (one, two)]
-        deck.refuse(
-            deck.speed - hit.u > limits[0] or hit.u > limits[1],
-            "speed",
-            "take a slower impactor: equations of state are not made for material behind a shock "
-            f"that is faster than sound at rest ({limits[0]:.0f} and {limits[1]:.0f} m/s)",
-        )
+        if deck.speed - hit.u > limits[0] or hit.u > limits[1]:
+            raise deck.error(
+                "speed",
+                "take a slower impactor: equations of state are not made for material behind a "
+                "shock that is faster than sound at rest "
+                f"({limits[0]:.0f} and {limits[1]:.0f} m/s)",
+            )
         return hit.p, hit.u, deck.front / hit.right_wave.head
 
     def estimate_cells(self) -> int:

@@ -53,11 +53,10 @@ class Convection1D(Problem):
 
     def __init__(self, deck: Convection1DDeck):
         super().__init__(deck)
-        deck.refuse(
-            deck.rayleigh == deck.mean_speed == 0.0,
-            "rayleigh",
-            "nothing would rise or sink, with mean_speed = 0; give one of them",
-        )
+        if deck.rayleigh == deck.mean_speed == 0.0:
+            raise deck.error(
+                "rayleigh", "nothing would rise or sink, with mean_speed = 0; give one of them"
+            )
         self.words = (
             f"Ra {deck.rayleigh:g}, Pr {deck.prandtl:g}, Pe {deck.peclet:g}, {deck.cells} cells, "
             f"grid {deck.grid.kind}"

@@ -63,15 +63,17 @@ class MovingGrid1D(Problem):
 
     def __init__(self, deck: MovingGrid1DDeck):
         super().__init__(deck)
-        deck.refuse(
-            len(deck.levels) != len(deck.fronts) + 1,
-            "levels",
-            f"they must be one more than the fronts, of which there are {len(deck.fronts)}",
-        )
+        if len(deck.levels) != len(deck.fronts) + 1:
+            raise deck.error(
+                "levels",
+                f"they must be one more than the fronts, of which there are {len(deck.fronts)}",
+            )
         rises = any(ahead >= behind for behind, ahead in pairwise(deck.levels))
-        deck.refuse(rises, "levels", "from front to front u has to fall")
+        if rises:
+            raise deck.error("levels", "from front to front u has to fall")
         falls = any(one >= other for one, other in pairwise([0.0, *deck.fronts, 1.0]))
-        deck.refuse(falls, "fronts", "positions must increase and lie between 0 and 1")
+        if falls:
+            raise deck.error("fronts", "positions must increase and lie between 0 and 1")
         self.exact = BurgersFronts(deck.viscosity, tuple(deck.levels), tuple(deck.fronts))
 
     def make_race(self, cells: int) -> FrontRace:

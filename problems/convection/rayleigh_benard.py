@@ -67,11 +67,10 @@ class RayleighBenard(BoxProblem):
     def __init__(self, deck: RayleighBenardDeck):
         super().__init__(deck)
         self.t_end = deck.run.t_end or BENARD_MARCH_TIME
-        deck.refuse(
-            deck.shape == "layer" and deck.sides != "adiabatic",
-            "sides",
-            "those of a layer are periodic; leave sides out or take shape = 'box'",
-        )
+        if deck.shape == "layer" and deck.sides != "adiabatic":
+            raise deck.error(
+                "sides", "those of a layer are periodic; leave sides out or take shape = 'box'"
+            )
         self.fluid = make_fluid(deck.rayleigh, deck.prandtl, deck.tilt)
         free = deck.walls == "free"
         self.critical = linear.FREE_LAYER_WAVENUMBER if free else linear.LAYER_WAVENUMBER

@@ -167,16 +167,13 @@ def draw_modes(deck, even: bool) -> list[Mode]:
     cells = deck.cells
     if spectrum is None:
         return []
-    deck.refuse(
-        spectrum.last < spectrum.first,
-        "spectrum.last",
-        f"it must be at least spectrum.first, {spectrum.first}",
-    )
-    deck.refuse(
-        2 * spectrum.last > cells,
-        "spectrum.last",
-        f"nodes resolve waves up to number {cells // 2} with {cells} cells per wavelength",
-    )
+    if spectrum.last < spectrum.first:
+        raise deck.error("spectrum.last", f"it must be at least spectrum.first, {spectrum.first}")
+    if 2 * spectrum.last > cells:
+        raise deck.error(
+            "spectrum.last",
+            f"nodes resolve waves up to number {cells // 2} with {cells} cells per wavelength",
+        )
     numbers = np.arange(spectrum.first, spectrum.last + 1)
     waves = _draw_normal(spectrum.seed, numbers.size)
     waves[1] *= not even

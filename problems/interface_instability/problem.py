@@ -118,16 +118,16 @@ class InterfaceInstability(Results, Problem):
             raise BadInput("deck: give `mach` or `shock_pressure`, not both")
         self.shock = self._make_shock()
         if late := deck.second_shock:
-            deck.refuse(
-                late.pressure <= self.shock.p,
-                "second_shock.pressure",
-                f"it must be above the pressure behind the first shock, {self.shock.p:g}",
-            )
-            deck.refuse(
-                deck.lengths is None,
-                "lengths",
-                "with a second_shock it must be given; it is found for one shock only",
-            )
+            if late.pressure <= self.shock.p:
+                raise deck.error(
+                    "second_shock.pressure",
+                    f"it must be above the pressure behind the first shock, {self.shock.p:g}",
+                )
+            if deck.lengths is None:
+                raise deck.error(
+                    "lengths",
+                    "with a second_shock it must be given; it is found for one shock only",
+                )
         even = deck.sides == "wall"
         drawn = draw_modes(deck, even)
         check_sense(deck, (self.rho_first, self.rho_second), drawn)
@@ -159,7 +159,8 @@ class InterfaceInstability(Results, Problem):
                 f"the run begins at k c t = {-self.arrival * self._rate:.3g}"
                 "; take a greater one, or start = 'incident'"
             )
-            deck.refuse(self.t_end <= 0.0, "kct_end", wanted)
+            if self.t_end <= 0.0:
+                raise deck.error("kct_end", wanted)
 
     def _check_handover(self) -> None:
         """Raise BadInput for keys that one grid of both materials cannot have, and for bonds of
@@ -167,26 +168,24 @@ class InterfaceInstability(Results, Problem):
         deck = self.deck
         name = "start" if self.is_captured else "handover"
         solids = [body for body, laws in self.laws.items() if laws.strength is not None]
-        deck.refuse(
-            deck.line.contact == "bonded" and len(solids) < 2,
-            "line.contact",
-            "only solids stick together; give both materials a `strength`",
-        )
-        deck.refuse(
-            self.may_hand_over and solids,
-            "strength",
-            f"{name} lays both materials on one grid, whose cells bear no shear",
-        )
-        deck.refuse(
-            self.may_hand_over and deck.refine,
-            "refine",
-            f"{name} lays both materials on one grid, whose lines do not follow the interface",
-        )
-        deck.refuse(
-            self.may_hand_over and deck.line.tension > 0.0,
-            "line.tension",
-            f"{name} lays both materials on one grid, where no line has a tension",
-        )
+        if deck.line.contact == "bonded" and len(solids) < 2:
+            raise deck.error(
+                "line.contact", "only solids stick together; give both materials a `strength`"
+            )
+        if self.may_hand_over and solids:
+            raise deck.error(
+                "strength", f"{name} lays both materials on one grid, whose cells bear no shear"
+            )
+        if self.may_hand_over and deck.refine:
+            raise deck.error(
+                "refine",
+                f"{name} lays both materials on one grid, whose lines do not follow the interface",
+            )
+        if self.may_hand_over and deck.line.tension > 0.0:
+            raise deck.error(
+                "line.tension",
+                f"{name} lays both materials on one grid, where no line has a tension",
+            )
 
     @functools.cached_property
     def mixture(self) -> Mixture:
@@ -256,7 +255,8 @@ class InterfaceInstability(Results, Problem):
                     f"{ways[short[0]]:.3g}"
                 )
         if self.deck.start == "crossed":
-            self.deck.refuse(fault, "start", f"{fault}; take 'incident'")
+            if fault:
+                raise self.deck.error("start", f"{fault}; take 'incident'")
             return "crossed"
         begins_in_time = (
             self.deck.run.t_end is not None or self._choose_since() * self._rate < self.deck.kct_end
@@ -290,11 +290,10 @@ class InterfaceInstability(Results, Problem):
         deck = self.deck
         if deck.shock_pressure is None:
             return shock_with_mach(self.eos_first, self.rho_first, deck.pressure, deck.mach or 1.5)
-        deck.refuse(
-            deck.shock_pressure <= deck.pressure,
-            "shock_pressure",
-            f"it must be above the pressure ahead, {deck.pressure:g}",
-        )
+        if deck.shock_pressure <= deck.pressure:
+            raise deck.error(
+                "shock_pressure", f"it must be above the pressure ahead, {deck.pressure:g}"
+            )
         return shock_to_pressure(self.eos_first, self.rho_first, deck.pressure, deck.shock_pressure)
 
     @property
@@ -359,11 +358,11 @@ class InterfaceInstability(Results, Problem):
     def count_rows(self) -> int:
         """Cells along the interface; BadInput for more than a side may have."""
         rows = max(2, round(self.deck.cells * self.deck.width))
-        self.deck.refuse(
-            rows > 10 * MOST_CELLS,
-            "width",
-            f"that makes {rows:.3g} cells along the interface; it may have {10 * MOST_CELLS}",
-        )
+        if rows > 10 * MOST_CELLS:
+            raise self.deck.error(
+                "width",
+                f"that makes {rows:.3g} cells along the interface; it may have {10 * MOST_CELLS}",
+            )
         return rows
 
     @property
@@ -492,16 +491,15 @@ class InterfaceInstability(Results, Problem):
         front = self.shape(y)
         lengths = self.choose_lengths()
         start = deck.gap * deck.wavelength + self.amplitude
-        deck.refuse(
-            min(lengths) <= 2.0 * self.amplitude,
-            "lengths",
-            f"each must be greater than twice the interface's amplitude, {self.amplitude:g}",
-        )
-        deck.refuse(
-            lengths[0] <= start,
-            "lengths",
-            f"the first must be greater than {start:g}, the gap and the amplitude",
-        )
+        if min(lengths) <= 2.0 * self.amplitude:
+            raise deck.error(
+                "lengths",
+                f"each must be greater than twice the interface's amplitude, {self.amplitude:g}",
+            )
+        if lengths[0] <= start:
+            raise deck.error(
+                "lengths", f"the first must be greater than {start:g}, the gap and the amplitude"
+            )
         return np.array([front, y])
 
     def plan(self) -> tuple[float, list[BlockPlan]]:
@@ -529,11 +527,11 @@ class InterfaceInstability(Results, Problem):
         front, y = self.make_interface()
         if self.start == "crossed":
             grids = [side.make_nodes() for side in self.crossed.sides]
-            self.deck.refuse(
-                any(len(find_bad_cells(grid)) for grid in grids),
-                "start",
-                "the interface is too steep for a first grid by linear theory; take 'incident'",
-            )
+            if any(len(find_bad_cells(grid)) for grid in grids):
+                raise self.deck.error(
+                    "start",
+                    "the interface is too steep for a first grid by linear theory; take 'incident'",
+                )
             return grids
         reach = max(self.deck.reach * self.deck.wavelength, LEAST_REACH_RATIO * np.abs(front).max())
         grids = []

@@ -129,25 +129,25 @@ class PlateOnWedge(Results, Problem):
         ni, nj = deck.cells
         self.contact = round(OVER_EDGE * ni)
         parts = self.contact, ni - self.contact, nj  # on the wedge, beyond it, across
-        deck.refuse(
-            min(parts) < 4,
-            "cells",
-            f"the plate needs 4 on the wedge, beyond it and across; these are {parts}",
-        )
+        if min(parts) < 4:
+            raise deck.error(
+                "cells", f"the plate needs 4 on the wedge, beyond it and across; these are {parts}"
+            )
         self.angle = math.radians(deck.angle)
         along = deck.face * math.cos(self.angle)
         down = deck.face * math.sin(self.angle)
         self.end = np.array([deck.edge + along, -down])
         self.length = float(self.end[0]) + deck.overhang
         self.base = float(self.end[1]) - deck.depth
-        deck.refuse(
-            deck.gap and deck.refinement,
-            "refinement",
-            "cells are finer at A only where the plate lies on the wedge from the start: no gap",
-        )
+        if deck.gap and deck.refinement:
+            raise deck.error(
+                "refinement",
+                "cells are finer at A only where the plate lies on the wedge from the start",
+            )
         times = [time for time, _ in deck.drive.history]
         falls = any(b <= a for a, b in itertools.pairwise(times))
-        deck.refuse(falls, "drive.history", "its times must increase")
+        if falls:
+            raise deck.error("drive.history", "its times must increase")
         # the plate as it flies, its speed V [m/s], and when the drive's shock is at its lower side
         self.flying = Body(solid.eos, solid.rho0)
         self.plate_speed = deck.drive.speed

@@ -62,7 +62,8 @@ class Detonation(Problem):
     def __init__(self, deck: DetonationDeck):
         super().__init__(deck)
         self.eos = eos = find_material(deck.explosive).eos
-        deck.refuse(not isinstance(eos, JWL), "explosive", "it must be a JWL material such as TNT")
+        if not isinstance(eos, JWL):
+            raise deck.error("explosive", "it must be a JWL material such as TNT")
         self.speed, self.pressure, rho = eos.find_detonation()
         self.particle_speed = self.speed * (1.0 - eos.rho0 / rho)
         self.size = deck.length / deck.cells

@@ -74,12 +74,10 @@ class FlyerTarget(Problem):
             f"speed_plate-{number}": "m/s" for number in range(1, len(deck.plates) + 1)
         }
         first, second, *more = deck.plates
-        first.refuse(first.gap, "gap", "nothing is before the first plate, whose gap must be 0")
-        first.refuse(
-            first.bond is not None,
-            "bond",
-            "nothing is before the first plate; give it to the next one",
-        )
+        if first.gap:
+            raise first.error("gap", "nothing is before the first plate, whose gap must be 0")
+        if first.bond is not None:
+            raise first.error("bond", "nothing is before the first plate; give it to the next one")
         self.materials = [find_material(plate.material) for plate in deck.plates]
         impact = deck.speed, second.gap, first.thickness, second.thickness
         self.theory = compute_plate_impact(*self.materials[:2], *impact)

@@ -52,7 +52,8 @@ class FreeStream(Problem):
             found = None if name == "gas" else find_material(name)
             self.fluids[block] = (found.eos, found.rho0) if found else (IdealGas(1.4), 1.0)
         two = deck.contact == "seam" and self.fluids["left"] != self.fluids["right"]
-        deck.refuse(two, "materials", "a seam joins blocks of one")
+        if two:
+            raise deck.error("materials", "a seam joins blocks of one")
         eos, rho = self.fluids["left"]
         turn = math.radians(deck.angle)
         speed = deck.mach * float(eos.sound_speed(rho, FREE_STREAM_PRESSURE))

@@ -49,11 +49,11 @@ class Noh(RadialProblem):
         self.shock_speed = 0.5 * (deck.gamma - 1.0)
         shock = self.shock_speed * deck.run.t_end
         size = 1.0 - deck.shrink * deck.run.t_end
-        deck.refuse(
-            shock > 0.9 * size,
-            "run.t_end",
-            f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier",
-        )
+        if shock > 0.9 * size:
+            raise deck.error(
+                "run.t_end",
+                f"the shock is at r = {shock:.3g} then, the grid's end at {size:.3g}; end earlier",
+            )
 
     def compute_density(self, r, t):
         n = self.dimensions

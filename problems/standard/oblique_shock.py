@@ -59,18 +59,17 @@ class ObliqueShock(Problem):
         found = solve_collision(gas, None, fall, self.angle)  # as a plate thrown onto a rigid wedge
         if not found.attached:
             most = math.degrees(search_pressure([ShockPolar(gas, deck.mach)], fall)[2])
-            deck.refuse(
-                True,
+            raise deck.error(
                 "angle",
                 f"at Mach {deck.mach:g} the shock stays attached up to {most:.4g} degrees only",
             )
         self.beta = found.plate.wave_angle
         self.pressure = found.p
-        deck.refuse(
-            math.tan(self.beta) >= 1.0,
-            "angle",
-            f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top",
-        )
+        if math.tan(self.beta) >= 1.0:
+            raise deck.error(
+                "angle",
+                f"the shock, at {math.degrees(self.beta):.3g} degrees, leaves through the top",
+            )
 
     def make_grids(self, t=0.0):
         """Straight upright lines between the wall and the top."""

@@ -69,7 +69,8 @@ class RayleighTaylor(Problem):
         self.pressure = deck.sound_speed**2 / GAS_GAMMA
         wave = WAVE_NUMBER, GRAVITY_ACCELERATION, 2.0 if self.heavy else 0.0
         square = compute_gravity_mode(*wave, deck.tension)
-        deck.refuse(square == 0.0, "tension", "there the wave neither grows nor swings")
+        if square == 0.0:
+            raise deck.error("tension", "there the wave neither grows nor swings")
         self.grows = square > 0.0
         self.exact = math.sqrt(abs(square))
         self.columns = max(4, deck.cells // 2)

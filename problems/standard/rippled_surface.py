@@ -102,9 +102,8 @@ class RippledSurface(Problem):
         self.amplitude = deck.ka0 / self.k
         self.columns = max(8, round(2.0 * deck.cells * deck.depth))
         shocked = deck.start == "shock"
-        deck.refuse(
-            shocked and deck.ka0 == 0.0, "ka0", "a flat surface does not grow after a shock"
-        )
+        if shocked and deck.ka0 == 0.0:
+            raise deck.error("ka0", "a flat surface does not grow after a shock")
 
     @property
     def length(self) -> float:

@@ -52,16 +52,15 @@ class Sedov(RadialProblem):
         self.blast = SedovBlast(deck.geometry, deck.gamma, energy=alpha)
         self.mesh = deck.mesh or ("fixed" if deck.geometry == "plane" else "follow")
         end = self.blast.radius(deck.run.t_end)
-        deck.refuse(
-            end < deck.size / deck.cells,
-            "run.t_end",
-            "the shock is in the first cell then; end later, or take smaller cells",
-        )
-        deck.refuse(
-            end > 0.95 * deck.size,
-            "run.t_end",
-            f"the shock is at r = {end:.3g} then, and sides of {deck.size:g} send it back",
-        )
+        if end < deck.size / deck.cells:
+            raise deck.error(
+                "run.t_end", "the shock is in the first cell then; end later, or take smaller cells"
+            )
+        if end > 0.95 * deck.size:
+            raise deck.error(
+                "run.t_end",
+                f"the shock is at r = {end:.3g} then, and sides of {deck.size:g} send it back",
+            )
 
     def compute_density(self, r, t):
         return self.blast.sample(r, t)[0]

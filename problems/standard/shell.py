@@ -98,7 +98,8 @@ class CollapsingShell(RadialProblem):
         with deck.blame("stop", "the shell cannot stop there"):
             self.speed = deck.speed or self.shell.find_speed(deck.stop)
         self.stop = self.shell.find_stop(self.speed)
-        deck.refuse(self.stop == 0.0, "speed", "so fast a shell reaches the centre")
+        if self.stop == 0.0:
+            raise deck.error("speed", "so fast a shell reaches the centre")
         times, _ = self.motion
         self.t_end = deck.run.t_end or END_PART * float(times[-1])
 

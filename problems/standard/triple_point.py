@@ -51,7 +51,8 @@ class TriplePoint(Problem):
 
     def __init__(self, deck: TriplePointDeck):
         super().__init__(deck)
-        deck.refuse(deck.cells % 2, "cells", "it must be even, the point is half a length up")
+        if deck.cells % 2:
+            raise deck.error("cells", "it must be even, the point is half a length up")
         left = GASES["left"][:2]  # plane Riemann solutions with the other two
         self.exact = {name: solve_riemann(*left, *GASES[name][:2]) for name in ("bottom", "top")}
 

@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shockgrid.regrid.jit import inlined, kernel
+
 SYMMETRIC_LENGTH = 1e-9  # of the mean length: up to which a block counts as symmetric
 ROUNDING_OF_MOTION = 1e-13  # of the mean length: up to which it differs from its image by rounding
 
@@ -80,6 +82,68 @@ class Symmetry(NamedTuple):
         return True
 
 
+@inlined
+def compute_edge_length(nodes, i, j, next_i, next_j):
+    """Length [m] of the edge between two nodes of a grid (2, ni+1, nj+1)."""
+    x, y = nodes
+    edge_x = x[next_i, next_j] - x[i, j]
+    edge_y = y[next_i, next_j] - y[i, j]
+    return np.sqrt(edge_x * edge_x + edge_y * edge_y)
+
+
+@inlined
+def compute_mean_side_edge(nodes):
+    """Mean of the mean lengths [m] of the edges along the sides j = const and i = const."""
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    total_i = 0.0
+    for i in range(ni):
+        total_i += compute_edge_length(nodes, i, 0, i + 1, 0)
+        total_i += compute_edge_length(nodes, i, nj, i + 1, nj)
+    total_j = 0.0
+    for j in range(nj):
+        total_j += compute_edge_length(nodes, 0, j, 0, j + 1)
+        total_j += compute_edge_length(nodes, ni, j, ni, j + 1)
+    return 0.25 * (total_i / ni + total_j / nj)
+
+
+@inlined
+def are_sides_symmetric(nodes, turns_i, turns_j, most):
+    """Whether the edges along the sides of a grid (2, ni+1, nj+1) are as long as their images.
+
+    turns_i, turns_j: whether the indices of the image run backwards; most: difference [m].
+    """
+    ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
+    for j in (0, nj):
+        image_j = nj - j if turns_j else j
+        for i in range(ni):
+            image_i = ni - 1 - i if turns_i else i
+            image = compute_edge_length(nodes, image_i, image_j, image_i + 1, image_j)
+            if not abs(compute_edge_length(nodes, i, j, i + 1, j) - image) <= most:
+                return False
+    for i in (0, ni):
+        image_i = ni - i if turns_i else i
+        for j in range(nj):
+            image_j = nj - 1 - j if turns_j else j
+            image = compute_edge_length(nodes, image_i, image_j, image_i, image_j + 1)
+            if not abs(compute_edge_length(nodes, i, j, i, j + 1) - image) <= most:
+                return False
+    return True
+
+
+@kernel(allocates=False)
+def find_turns_of_sides(nodes):
+    """For each turn but the first of TURNS: whether it leaves the lengths along the sides alike.
+
+    nodes: (2, ni+1, nj+1).
+    """
+    most = SYMMETRIC_LENGTH * compute_mean_side_edge(nodes)
+    return (
+        are_sides_symmetric(nodes, True, False, most),
+        are_sides_symmetric(nodes, False, True, most),
+        are_sides_symmetric(nodes, True, True, most),
+    )
+
+
 def find_symmetry(
     previous: np.ndarray,
     displaced: np.ndarray,
@@ -92,11 +156,14 @@ def find_symmetry(
     `spacing_departure` (ni+1, nj+1): that of its lines, if they have their own spacing.  The
     lengths along the sides are compared first: most blocks end there.
     """
+    found_before = find_turns_of_sides(previous)
+    if not any(found_before):
+        return None
+    found_after = find_turns_of_sides(displaced)
     departure = spacing_departure
-    sides = [_find_side_lengths(grid) for grid in (previous, displaced)]
     turns = []
-    for turn in TURNS[1:]:
-        if not all(_agree(turn, lengths, mean) for pair, mean in sides for lengths in pair):
+    for turn, before, after in zip(TURNS[1:], found_before, found_after, strict=True):
+        if not (before and after):
             continue
         if not all(_agree(turn, values, np.abs(values).max()) for values in cell_values):
             continue
@@ -142,13 +209,6 @@ def find_mean_length(nodes: np.ndarray) -> float:
     """Mean length [m] of the edges of a grid (2, ni+1, nj+1)."""
     steps = np.diff(nodes, axis=1), np.diff(nodes, axis=2)
     return float(np.concatenate([np.hypot(*step).ravel() for step in steps]).mean())
-
-
-def _find_side_lengths(nodes: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], float]:
-    """Lengths of the edges along the sides j = const and i = const of a grid, and their mean."""
-    along_i = np.hypot(*np.diff(nodes[:, :, [0, -1]], axis=1))
-    along_j = np.hypot(*np.diff(nodes[:, [0, -1]], axis=2))
-    return (along_i, along_j), float((along_i.mean() + along_j.mean()) / 2.0)
 
 
 def _agree(turn: Turn, values: np.ndarray, scale: float) -> bool:

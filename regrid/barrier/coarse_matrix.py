@@ -89,7 +89,7 @@ def store_mean_edges(nodes, rows, j, last_j, k, Z):
     Z[FAR_Y, k] = y3 - y4
 
 
-@kernel
+@kernel(allocates=False)
 def gather_cells(nodes, inputs, first, last, first_columns, last_columns, Z):
     """Gather the fine cells at centres of coarse ones in `Z`: unscaled edges, lengths, weights.
 
@@ -137,7 +137,7 @@ def take_gathered_edges(k, Z):
     )  # fmt: skip
 
 
-@kernel
+@kernel(allocates=False)
 def weigh_cells(inputs, growth, count, Z):
     """Weight of a corner of the gathered cells (theory R4.3, R4.4); False if one is folded."""
     full = functional.take_corner_weight(inputs)
@@ -161,7 +161,7 @@ def weigh_cells(inputs, growth, count, Z):
     return folded == 0
 
 
-@kernel
+@kernel(allocates=False)
 def add_corners(a_row, b_row, a_g, b_g, inputs, count, Z):
     """Add the blocks aa, ab, bb of one corner of the gathered cells to T (theory R4.7).
 
@@ -184,14 +184,19 @@ def add_corners(a_row, b_row, a_g, b_g, inputs, count, Z):
 @inlined
 def add_hessian(k, hessian, Z):
     """Add a `regrid.barrier.functional.Hessian` to T."""
-    for row in range(3):
-        Z[BLOCK_AA + row, k] += hessian[row]
-        Z[BLOCK_BB + row, k] += hessian[3 + row]
-    for row in range(4):
-        Z[BLOCK_AB + row, k] += hessian[6 + row]
+    Z[BLOCK_AA, k] += hessian.aa_xx
+    Z[BLOCK_AA + 1, k] += hessian.aa_xy
+    Z[BLOCK_AA + 2, k] += hessian.aa_yy
+    Z[BLOCK_BB, k] += hessian.bb_xx
+    Z[BLOCK_BB + 1, k] += hessian.bb_xy
+    Z[BLOCK_BB + 2, k] += hessian.bb_yy
+    Z[BLOCK_AB, k] += hessian.ab_xx
+    Z[BLOCK_AB + 1, k] += hessian.ab_xy
+    Z[BLOCK_AB + 2, k] += hessian.ab_yx
+    Z[BLOCK_AB + 3, k] += hessian.ab_yy
 
 
-@kernel
+@kernel(allocates=False)
 def add_cell_terms(numbers, count, Z):
     """Add the Hessian of the terms of the gathered cells to T."""
     for k in range(count):
@@ -239,7 +244,7 @@ def take_block(rows, start, k):
     return rows[start, k], rows[start + 1, k], rows[start + 2, k], rows[start + 3, k]
 
 
-@kernel
+@kernel(allocates=False)
 def couple_nodes(stretch, lines, count, Z, here, after):
     """Add a row of coarse cells to the rows of matrix blocks of the nodes on either side of it.
 
@@ -391,12 +396,13 @@ def solve_lines(matrix, r, z):
         z_x, z_y = z[0, i], z[1, i]
         r_x, r_y = r[0, i], r[1, i]
         after_x, after_y = z[0, i + 1], z[1, i + 1]
+        factor_x, factor_y = here[COARSE_FACTOR:], here[COARSE_FACTOR + 2 :]
         for j in range(1, n_j):
             pivot = take_whole(here, COARSE_PIVOT, j)
-            factor = take_block(here, COARSE_FACTOR, j)
             forward_x, forward_y = multiply_block(pivot, z_x[j], z_y[j])
-            passed_x, passed_y = multiply_block(factor, after_x[j], after_y[j])
+            passed_x = factor_x[0, j] * after_x[j] + factor_x[1, j] * after_y[j]
             z_x[j] = forward_x - passed_x
+            passed_y = factor_y[0, j] * after_x[j] + factor_y[1, j] * after_y[j]
             z_y[j] = forward_y - passed_y
         for j in range(1, n_j):
             total += r_x[j] * z_x[j] + r_y[j] * z_y[j]
@@ -422,20 +428,24 @@ def fill_product(matrix, p, out):
         here_x, here_y = p[0, i], p[1, i]
         after_x, after_y = p[0, i + 1], p[1, i + 1]
         out_x, out_y = out[0, i], out[1, i]
+        # the node itself; each loop of few rows, so that it runs over vectors in narrow blocks too
         for j in range(1, n_j):
-            # the node, and its neighbours along i and j
-            sums = multiply_block(take_whole(here, COARSE_OWN, j), here_x[j], here_y[j])
+            own = take_whole(here, COARSE_OWN, j)
+            out_x[j], out_y[j] = multiply_block(own, here_x[j], here_y[j])
+        # its neighbours along i
+        for j in range(1, n_j):
             block = take_block(here, COARSE_EAST, j)
-            sums = add_neighbour(sums, block, after_x[j], after_y[j])
+            sums = add_neighbour((out_x[j], out_y[j]), block, after_x[j], after_y[j])
             block = transpose_block(take_block(before, COARSE_EAST, j))
-            sums = add_neighbour(sums, block, before_x[j], before_y[j])
-            block = take_block(here, COARSE_NORTH, j)
-            sums = add_neighbour(sums, block, here_x[j + 1], here_y[j + 1])
-            block = transpose_block(take_block(here, COARSE_NORTH, j - 1))
-            sums = add_neighbour(sums, block, here_x[j - 1], here_y[j - 1])
-            out_x[j], out_y[j] = sums
+            out_x[j], out_y[j] = add_neighbour(sums, block, before_x[j], before_y[j])
+        # its neighbours along j
         for j in range(1, n_j):
-            # the couplings across the four cells around the node are symmetric blocks
+            block = take_block(here, COARSE_NORTH, j)
+            sums = add_neighbour((out_x[j], out_y[j]), block, here_x[j + 1], here_y[j + 1])
+            block = transpose_block(take_block(here, COARSE_NORTH, j - 1))
+            out_x[j], out_y[j] = add_neighbour(sums, block, here_x[j - 1], here_y[j - 1])
+        # the couplings across the four cells around it are symmetric blocks
+        for j in range(1, n_j):
             block = take_whole(here, COARSE_ACROSS, j)
             x, y = multiply_block(block, after_x[j + 1], after_y[j + 1])
             sums = (-x, -y)
@@ -505,9 +515,9 @@ def solve(matrix, vectors, tolerance: float, most_iterations: int) -> int:
     totals = np.zeros(x.shape[2])
     scratch = np.zeros((1, 1))
     # residual of the first x
-    fill_product(matrix, x, product)
+    fill_product.entry(matrix, x, product)
     r -= product
-    iterations, first_square, _, positive = solve_coarse(
+    iterations, first_square, _, positive = solve_coarse.entry(
         columns, matrix[np.newaxis], (x, r, z), (p, p_old, product), totals,
         (tolerance, NO_FLOOR, most_iterations), scratch,
     )  # fmt: skip

@@ -62,7 +62,7 @@ def end_stretch(stretch, low, cells, Z, span, sums):
         Z[2 * span + col] = Z[3 * span + col] = 0.0
 
 
-@kernel
+@kernel(allocates=False)
 def fill_coarse_right(starts_j, sums, right):
     """Minus the gradient in alpha and beta at coarse nodes, `right` (2, parts_i + 1, parts_j + 1).
 
@@ -88,7 +88,7 @@ def fill_coarse_right(starts_j, sums, right):
             out[0] = out[parts_j] = 0.0
 
 
-@kernel
+@kernel(allocates=False)
 def take_frames(nodes, starts_i, starts_j, right, lines, solution):
     """Convert alpha and beta to x and y: the `right` side, and the initial `solution`.
 
@@ -115,7 +115,7 @@ def take_frames(nodes, starts_i, starts_j, right, lines, solution):
     return True
 
 
-@kernel
+@kernel(allocates=False)
 def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
     """Convert the displacement `solution` (2, parts_i + 1, parts_j + 1) to alpha and beta.
 
@@ -156,7 +156,7 @@ def fill_coarse_lines(nodes, starts_i, starts_j, solution, lines):
     return np.sqrt(largest_square)
 
 
-@kernel
+@kernel(allocates=False)
 def add_coarse(nodes, starts_i, lines, out):
     """`out` = `nodes` + alpha e_i + beta e_j, both linear in i between the coarse `lines`.
 
@@ -266,13 +266,13 @@ class CoarseCorrection:
             # right side, and the earlier correction as a first solution
             right = level.vectors[0]
             solution = level.vectors[1]
-            fill_coarse_right(level.starts_j, self.sums, right)
-            if not take_frames(nodes, *starts, right, self.lines, solution):
+            fill_coarse_right.entry(level.starts_j, self.sums, right)
+            if not take_frames.entry(nodes, *starts, right, self.lines, solution):
                 return 0.0
-            if not fill_coarse_matrix(nodes, inputs, *starts, level.matrix):
+            if not fill_coarse_matrix.entry(nodes, inputs, *starts, level.matrix):
                 return 0.0
             # solved
-            factor_lines(level.matrix)
+            factor_lines.entry(level.matrix)
             iterations = solve(
                 level.matrix, level.vectors, tuning.exact_tolerance, tuning.max_iterations
             )
@@ -280,7 +280,7 @@ class CoarseCorrection:
                 return 0.0
             self.iterations += iterations
             # as displacements along the lines
-            size = float(fill_coarse_lines(nodes, *starts, solution, self.lines))
+            size = float(fill_coarse_lines.entry(nodes, *starts, solution, self.lines))
             if size < least_size:
                 return 0.0
         self.lines *= tuning.coarse_part

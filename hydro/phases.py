@@ -140,7 +140,8 @@ def _list_old(block: Block) -> tuple[Any, ...]:
     Of a solid, then the arrays of its stress.
     """
     if block.stress is not None:
-        return *block.list_starts(), block.nodes, block.stress.arrays
+        # one by one: kernels with threads take no tuple within a tuple
+        return *block.list_starts(), block.nodes, *block.stress.arrays
     return *block.list_starts(), block.nodes
 
 

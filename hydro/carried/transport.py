@@ -65,6 +65,8 @@ CORNER_X = 9
 CORNER_Y = 13
 METRIC_ROWS = 17
 
+NO_SIDES = np.zeros((0, 3), dtype=np.int64)  # stands for the open sides of a block
+
 
 @inlined
 def bound(change, value, lowest, highest):
@@ -488,8 +490,12 @@ class Transport:
         )  # fmt: skip
 
     def trace(self, block: Any) -> None:
-        """Phase 6, with the traces of the sides known, before the couplings' fluxes."""
-        trace(self.slopes, self.centres, block.plan.opened, block.rim.rows)
+        """Phase 6, with the traces of the sides known, before the couplings' fluxes.
+
+        Of a solid its stress comes before what passes through open sides.
+        """
+        opened = block.plan.opened if block.stress is None else NO_SIDES
+        trace(self.slopes, self.centres, opened, block.rim.rows)
 
     def carry(self, block: Any, dt: float) -> None:
         """Phase 6, after the flow's update: the new values."""

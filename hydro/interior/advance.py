@@ -41,6 +41,7 @@ from shockgrid.hydro.interior.scratch import (
     prefetch_rows,
 )
 from shockgrid.hydro.interior.slopes import fill_steps
+from shockgrid.hydro.interior.solid import SolidArrays
 from shockgrid.hydro.interior.update import make_update
 from shockgrid.hydro.rim import LENGTH_GHOST, MASS
 from shockgrid.hydro.rows import (
@@ -170,7 +171,7 @@ def make_flow_kernels(
 ) -> FlowKernels:
     """Kernels of an `EquationOfState` class, a limiter (LIMITERS of `formulas.reconstruction`), a
     geometry and a flux (HLL_JUMP_THRESHOLDS of `formulas.riemann`); `is_solid`: the material has
-    strength, and `old` of the kernels ends with its `hydro.interior.solid.SolidArrays`."""
+    strength, and `old` of the kernels ends with the arrays of its `SolidArrays`."""
     energy = eos_class.energy_part
     sound = eos_class.sound_speed_squared_part
     low_mach = limiter in LOW_MACH
@@ -305,6 +306,8 @@ def make_flow_kernels(
     def advance_tile(old, new, rim, dt, parameters, number, Z, tile_totals):
         """Advance the cells of one tile; see `advance` for the arguments."""
         state, void_energy, nodes = old[:3]
+        if is_solid:
+            solid = SolidArrays(*old[3:])
         state_new, void_energy_new, nodes_new, rates_new, crowding_new, mass_i, mass_j = new
         keeps_masses = mass_i.shape[0] > 1
         inverse_dt = 1.0 / dt if dt > 0.0 else 0.0
@@ -345,7 +348,7 @@ def make_flow_kernels(
                 if opens_voids:
                     copy_row(void_energy, row, column, cells, Z, scratch.VOID_LOADED + 1)
                 if is_solid:
-                    load_stress(old[3], row, column, cells, Z)
+                    load_stress(solid, row, column, cells, Z)
                 # prefetch what the next row reads and where this one's results are written
                 prefetch_rows(state, min(row + 3, ni + 1), column, cells + 2)
                 prefetch_rows(nodes, min(row + 3, ni), first_node, node_count)
@@ -381,7 +384,7 @@ def make_flow_kernels(
                     copy_row(rim, MASS + q, nj + column, cells, Z, target)
             elif row >= tile.first_row:
                 if is_solid:
-                    copy_rows(old[3].stress_i, row, column, cells, Z, scratch.STRESS_I + 1)
+                    copy_rows(solid.stress_i, row, column, cells, Z, scratch.STRESS_I + 1)
                 fill_upwind_i(Z, whole)
                 fill_flux_i(Z, whole, parameters)
                 first_face = min(first_hll_cell, first_hll_before)
@@ -393,7 +396,7 @@ def make_flow_kernels(
                 if is_solid:
                     add_shear_flux_i(Z, padded)
                     source = scratch.SPEED_I_X + entry
-                    copy_rows_back(Z, source, count, old[3].speed_i, row, first_j)
+                    copy_rows_back(Z, source, count, solid.speed_i, row, first_j)
             if keeps_masses and row >= tile.first_row:
                 copy_back(Z, scratch.FLUX_I_MASS + entry, count, mass_i, row, first_j)
             # the other traces; faces towards +i replace those towards -i, whose fluxes are known
@@ -404,7 +407,7 @@ def make_flow_kernels(
             # fluxes between the cells of the row, and through the sides at its ends
             if is_own:
                 if is_solid:
-                    copy_rows(old[3].stress_j, row, column, cells + 1, Z, scratch.STRESS_J + 1)
+                    copy_rows(solid.stress_j, row, column, cells + 1, Z, scratch.STRESS_J + 1)
                 fill_upwind_j(Z, whole)
                 fill_flux_j(Z, whole, parameters)
                 if first_hll_cell <= last_hll_cell:
@@ -414,7 +417,7 @@ def make_flow_kernels(
                 if is_solid:
                     add_shear_flux_j(Z, padded)
                     source = scratch.SPEED_J_X + entry
-                    copy_rows_back(Z, source, count + 1, old[3].speed_j, row, first_j)
+                    copy_rows_back(Z, source, count + 1, solid.speed_j, row, first_j)
                 if first_j == 0:
                     for q in range(FLUX_ROWS):
                         inward = -rim[MASS + q, 2 * nj + row]
@@ -454,8 +457,8 @@ def make_flow_kernels(
 
         old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
         nj): energy of cells with voids minus that of intact material at the same density and p = 0;
-        nodes (2, ni + 1, nj + 1); for a solid, its `SolidArrays`.  new: the first three, of which
-        two are written, the rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and
+        nodes (2, ni + 1, nj + 1); for a solid, then those of its `SolidArrays`.  new: the first
+        three, of which two are written, the rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3, and
         the rates of mass through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where nobody asks for
         them.  rim: rows of `hydro.rim` with the fluxes through the sides and the lengths of the
         ghosts; scratch (threads, SIZE); tile_totals (tiles, 8): columns as in `hydro.rows`.

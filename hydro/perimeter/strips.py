@@ -26,6 +26,7 @@ from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.interior.reconstruction import make_row_phases
 from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.hydro.interior.slopes import fill_steps
+from shockgrid.hydro.interior.solid import SolidArrays
 from shockgrid.hydro.perimeter.contacts import (
     AXIS,
     fill_open_fluxes,
@@ -281,6 +282,8 @@ def make_side_kernels(
     def predict(old, half_dt, parameters, Z, rim):
         """State at mid-time at the cells' centres, gradients, switches; ghosts must be known."""
         state, void_energy, nodes = old[:3]
+        if is_solid:
+            solid = SolidArrays(*old[3:])
         ni = nodes.shape[1] - 1
         nj = nodes.shape[2] - 1
         for side in range(len(SIDE_NAMES)):
@@ -312,8 +315,8 @@ def make_side_kernels(
                 if is_solid:
                     for k in range(m):
                         i, j = find_strip_cell(strip, 0, start + k)
-                        Z[scratch.STRESS_X + 1 + k] = old[3].pull[0, i, j]
-                        Z[scratch.STRESS_Y + 1 + k] = old[3].pull[1, i, j]
+                        Z[scratch.STRESS_X + 1 + k] = solid.pull[0, i, j]
+                        Z[scratch.STRESS_Y + 1 + k] = solid.pull[1, i, j]
                 low = rim[LENGTH_GHOST, strip.face_before] if start == 0 else -1.0
                 high = rim[LENGTH_GHOST, strip.face_after] if start + m == strip.cells else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)
@@ -440,8 +443,8 @@ def make_side_kernels(
 
     @kernel(allocates=False)
     def trace_sides(nodes, nodes_new, inverse_dt, parameters, wave_law, walls, opened, rim):
-        """Faces between the old nodes and the new ones, traces in their middles, and the fluxes
-        through walls and open sides.
+        """Faces between the old nodes and the new ones, traces in their middles, and of fluids the
+        fluxes through walls and open sides.
 
         walls (n, 3): first faces of walls, those after the last, and the kind: WALL, PISTON or
         AXIS; opened (n, 3): likewise of open sides, and the first row of the state beyond.
@@ -454,8 +457,9 @@ def make_side_kernels(
             if walls[wall, 2] == AXIS:
                 place_traces_on_axis(nodes, nodes_new, walls[wall, 0], walls[wall, 1], rim)
         trace_faces(rim, parameters, 0, rim.shape[1])
-        fill_wall_fluxes(rim, walls, wave_law, curved)
-        fill_open_fluxes(rim, opened, curved)
+        if not is_solid:  # for solids `hydro.strength.sides` fills them, with their stress
+            fill_wall_fluxes(rim, walls, wave_law, curved)
+            fill_open_fluxes(rim, opened, curved)
 
     return SideKernels(
         start_sides, predict_sides, trace_sides, make_fill_polygons(eos_class, geometry)

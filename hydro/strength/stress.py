@@ -27,6 +27,7 @@ from shockgrid.hydro.eos.conversion import (
     open_voids,
 )
 from shockgrid.hydro.eos.materials import check_solid
+from shockgrid.hydro.eos.temperature import REST_TEMPERATURE
 from shockgrid.hydro.formulas.strength import LONGITUDINAL_PART, add_shear_wave
 from shockgrid.hydro.interior.solid import make_solid_arrays
 from shockgrid.hydro.rows import RHO, P
@@ -97,11 +98,7 @@ def add_stress_fields(
 def stiffen_wave_law(wave_law: tuple[float, ...], eos: Any, law: StrengthLaw) -> tuple[float, ...]:
     """`EquationOfState.wave_law` with the impedance at rest of longitudinal waves."""
     a, b, z = wave_law
-    rest_density = np.array([float(eos.rho0)])
-    temperature = (
-        eos.temperature(rest_density, 0.0 * rest_density) if law.needs_temperature else None
-    )
-    shear = float(law.shear_modulus(rest_density, 0.0 * rest_density, temperature)[0])
+    shear, _ = law.find_at_rest(eos.rho0, REST_TEMPERATURE)
     return a, b, float(z * z + LONGITUDINAL_PART * shear * eos.rho0) ** 0.5
 
 

@@ -30,7 +30,6 @@ from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.roots import find_root
 
 ROOT_TOLERANCE = 1e-15
-LOW_STRAIN_RATE = 1.0  # [1/s], at which elastic limits are given
 RELEASE_TOLERANCE = 1e-11
 # of rho0: how far a release from a shock is followed before S = 0 must have been reached
 RELEASED_DENSITY_PART = 0.7
@@ -91,15 +90,11 @@ class WaveState:
 
 def make_solid_at_rest(material: Material, law: StrengthLaw | None = None) -> Solid:
     """The solid that a material is at rest: G and Y of `law`, by default its own, without plastic
-    strain, at REST_TEMPERATURE and strain rates up to `LOW_STRAIN_RATE`; a fluid without a law."""
+    strain, at REST_TEMPERATURE and low strain rates; a fluid without a law."""
     law = law or material.strength
     if law is None:
         return Solid(material.eos, material.rho0, 0.0, 0.0)
-    rest = np.array([material.rho0]), np.zeros(1), np.full(1, REST_TEMPERATURE)
-    shear_modulus = float(law.shear_modulus(*rest)[0])
-    rate = np.full(1, LOW_STRAIN_RATE)
-    yield_stress = float(law.flow_stress(np.zeros(1), rate, *rest)[0])
-    return Solid(material.eos, material.rho0, shear_modulus, yield_stress)
+    return Solid(material.eos, material.rho0, *law.find_at_rest(material.rho0, REST_TEMPERATURE))
 
 
 def make_rest(solid: Solid) -> WaveState:

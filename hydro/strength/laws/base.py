@@ -17,6 +17,8 @@ import numpy as np
 
 from shockgrid.regrid.errors import BadInput
 
+LOW_STRAIN_RATE = 1.0  # [1/s], at which elastic limits are given
+
 
 def check_parameters(law: Any, subject: str) -> None:
     """Raise BadInput for a parameter of a law that is no number, or none of its range.
@@ -74,6 +76,20 @@ class StrengthLaw:
     def hardening(self, plastic_strain, strain_rate, density, pressure, temperature) -> np.ndarray:
         """Slope dY/d(plastic strain) [Pa] of the flow stress; here 0."""
         return np.zeros(np.shape(density))
+
+    def find_at_rest(
+        self,
+        rho0: float,
+        temperature: float,
+        plastic_strain: float = 0.0,
+        strain_rate: float = LOW_STRAIN_RATE,
+    ) -> tuple[float, float]:
+        """Shear modulus and flow stress [Pa] without pressure, at a density and a temperature."""
+        state = np.full(1, float(rho0)), np.zeros(1), np.full(1, temperature)
+        modulus = self.shear_modulus(*state)
+        deformation = np.full(1, plastic_strain), np.full(1, strain_rate)
+        flow_stress = self.flow_stress(*deformation, *state)
+        return float(modulus[0]), float(flow_stress[0])
 
 
 @dataclass(frozen=True)

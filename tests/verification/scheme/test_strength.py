@@ -13,6 +13,7 @@ from builders import (
     check_restarts,
     collect_columns,
     free,
+    get_bits,
     march,
     march_whole,
     wall_off,
@@ -201,7 +202,18 @@ def test_a_seam_changes_nothing():
         assert np.abs(found - expected).max() < 1e-10 * size, name
 
 
-def test_restarts_threads_and_ranks_have_the_same_bits():
+@pytest.mark.parametrize("cut", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_threads_have_the_same_bits(cut):
+    found = []
+    for threads in (1, 2):
+        simulation = make_seamed(cut, threads, (256, 64), mesh="fixed")
+        assert simulation.workers.side_by_side == (cut and threads == 2)
+        march(simulation, 4)
+        found.append(get_bits(simulation.get_state()))
+    assert found[0] == found[1]
+
+
+def test_restarts_and_ranks_have_the_same_bits():
     check_restarts(make_seamed, [3, 11])
     compare_with_ranks(make_seamed, 6, (2,))
     tall = functools.partial(make_seamed, False, cells=(70, 6), mesh="fixed")

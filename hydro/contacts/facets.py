@@ -12,7 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from shockgrid.hydro.contacts.lines import BOTH, EARLIER, LATER, is_mirrored_end
-from shockgrid.hydro.facets.lines import find_curve_normal, find_point, measure_square, project
+from shockgrid.hydro.facets.lines import (
+    compute_normal,
+    find_curve_normal,
+    find_point,
+    measure_square,
+    project,
+)
 from shockgrid.hydro.facets.rows import (
     AREA_X,
     AREA_Y,
@@ -34,6 +40,7 @@ from shockgrid.regrid.measure.crossings import LEAST_X, LEAST_Y, MOST_X, MOST_Y
 SNAPPED_FACE_PART = 1e-9  # parts of a face closer than this to a node are at the node
 SEARCHED_FACES = 3  # faces on either side of its old one on which a pin is looked for again
 RIGHT_ANGLE_COSINE = 1e-3  # of the angle between two faces that counts as a right one
+LEAST_FACING = 0.1  # cosine of the angle between the normals of two faces that look at each other
 MOST_BULGE = 0.1  # of a face: so far off it may the other line's nodes lie between its two pins
 
 
@@ -140,16 +147,59 @@ def is_film(inner, k, line, a, x, y):
 
 
 @compiled_once
-def is_round_corner(line, mirrored, a, fraction, deep):
-    """Whether a point, `deep` [m] behind face `a` at this fraction of it, is nearer to
-    the next side.
+def compute_normal_between(x_start, y_start, x_stop, y_stop):
+    """Unit vector to the right of the way from one point to another; (0, 0) where they are one."""
+    dx, dy = x_stop - x_start, y_stop - y_start
+    length = (dx * dx + dy * dy) ** 0.5
+    return (dy / length, -dx / length) if length > 0.0 else (0.0, 0.0)
 
-    So it is at a corner of the other body.  Lines go on where their ends are `mirrored`.
+
+@compiled_once
+def compute_outline_normal(points, beyond, k):
+    """Mean of the outward unit normals of the faces before and after node `k` of a body's
+    outline."""
+    last = points.shape[1] - 1
+    x, y = points[0, k], points[1, k]
+    x_before, y_before = beyond[0, 0], beyond[1, 0]
+    if k > 0:
+        x_before, y_before = points[0, k - 1], points[1, k - 1]
+    x_after, y_after = beyond[0, 1], beyond[1, 1]
+    if k < last:
+        x_after, y_after = points[0, k + 1], points[1, k + 1]
+    first_x, first_y = compute_normal_between(x_before, y_before, x, y)
+    second_x, second_y = compute_normal_between(x, y, x_after, y_after)
+    normal_x, normal_y = first_x + second_x, first_y + second_y
+    length = (normal_x * normal_x + normal_y * normal_y) ** 0.5
+    return (normal_x / length, normal_y / length) if length > 0.0 else (0.0, 0.0)
+
+
+@compiled_once
+def is_round_corner(points, beyond, k, line, other_nodes, a, deep):
+    """Whether node `k`, `deep` [m] behind face `a` of a line, has come in through the next side.
+
+    So it is at a corner of the other body, where the next side looks at the node and is nearer to
+    it by the way against the node's normal.  Lines go on where their ends are mirrored.
     """
-    length = measure_square(line, a) ** 0.5
     last = line.shape[1] - 2
-    round_start = a == 0 and not mirrored[0] and fraction * length < deep
-    return round_start or (a == last and not mirrored[1] and (1.0 - fraction) * length < deep)
+    for end, end_face in ((0, 0), (1, last)):
+        if a != end_face or other_nodes.mirrored[end]:
+            continue
+        corner = a + end
+        x, y = line[0, corner], line[1, corner]
+        x_beyond, y_beyond = other_nodes.beyond[0, end], other_nodes.beyond[1, end]
+        next_x, next_y = compute_normal_between(x, y, x_beyond, y_beyond)
+        if end == 0:
+            next_x, next_y = -next_x, -next_y
+        normal_x, normal_y = compute_outline_normal(points, beyond, k)
+        facing = -(normal_x * next_x + normal_y * next_y)
+        next_deep = (x - points[0, k]) * next_x + (y - points[1, k]) * next_y
+        if facing <= LEAST_FACING or next_deep < 0.0:
+            continue
+        face_x, face_y = compute_normal(line, a, 1.0)
+        face_facing = -(normal_x * face_x + normal_y * face_y)
+        if next_deep * face_facing < deep * facing:
+            return True
+    return False
 
 
 @kernel
@@ -201,7 +251,7 @@ def find_pins(nodes, other_nodes, pins, tolerance, reach, one_body):
                 if not is_on and is_beside_face and faces_each_other(line, a, along_x, along_y):
                     depth = find_depth(line, a, x, y)
                     is_on = 0.0 < depth <= MOST_BULGE * face_square**0.5
-                    if is_round_corner(line, other_nodes.mirrored, a, fraction, depth):
+                    if is_round_corner(points, nodes.beyond, k, line, other_nodes, a, depth):
                         is_on = False  # behind the next side, at the corner of a body
                 # of the side that looks at it; of one body: not through a film
                 if is_on and pins.counts[k]:
@@ -266,78 +316,6 @@ def find_deepest(nodes, other_nodes, pinned, reach):
             deepest = depth
             deepest_node = k
     return deepest, deepest_node
-
-
-@kernel
-def measure_depths(nodes, other_nodes, reach, depths):
-    """Fill how far new nodes lie behind the other new line, `depths` (n,) [m]; below 0 in front.
-
-    Behind: behind the nearest face, where that looks at the nodes' line; not, where they lie round
-    a corner of the other body, behind its next side.  Nodes further from it than `reach` [m] are
-    -reach behind it.  reach: also for the way of both lines since their boxes were made.
-    """
-    points = nodes.new
-    line = other_nodes.new
-    group = other_nodes.group
-    count = line.shape[1] - 1
-    last = points.shape[1] - 1
-    groups = np.empty(other_nodes.boxes.shape[1], np.int64)
-    near_groups = 0
-    for k in range(last + 1):
-        # groups of faces that are near this group of nodes
-        if k % group == 0:
-            stop = min(last + 1, k + group)
-            near_groups = find_groups(points, points, k, stop, other_nodes.boxes, reach, groups)
-        depths[k] = -reach
-        if near_groups == 0:
-            continue
-        x, y = points[0, k], points[1, k]
-        along_x, along_y = find_direction(points, k)
-        # the nearest face
-        least_square = reach * reach
-        for number in range(near_groups):
-            g = groups[number]
-            if lies_away(x, y, other_nodes.boxes, g, reach):
-                continue
-            for a in range(g * group, min(count, (g + 1) * group)):
-                fraction, distance_square = project(line, a, x, y)
-                if distance_square >= least_square:
-                    continue
-                least_square = distance_square
-                depths[k] = -(distance_square**0.5)
-                if not faces_each_other(line, a, along_x, along_y):
-                    continue
-                # behind it, and not only round a corner of the other body
-                depth = find_depth(line, a, x, y)
-                next_face = a - 1 if fraction <= 0.0 else a + 1
-                if (
-                    not 0.0 < fraction < 1.0 and 0 <= next_face < count
-                ):  # nearest to a node: of both faces
-                    depth = min(depth, find_depth(line, next_face, x, y))
-                if depth > 0.0 and not is_round_corner(
-                    line, other_nodes.mirrored, a, fraction, depth
-                ):
-                    depths[k] = distance_square**0.5
-
-
-@kernel
-def sum_behind(points, depths):
-    """Area [m²] between a line (2, n) and the other one where its nodes lie `depths` behind that.
-
-    Between two nodes the depth changes linearly; where one is in front, up to where it is 0.
-    """
-    area = 0.0
-    for a in range(points.shape[1] - 1):
-        deeper = max(depths[a], depths[a + 1])
-        shallower = min(depths[a], depths[a + 1])
-        if deeper > 0.0:
-            mean = (
-                0.5 * (deeper + shallower)
-                if shallower >= 0.0
-                else 0.5 * deeper * deeper / (deeper - shallower)
-            )
-            area += mean * measure_square(points, a) ** 0.5
-    return area
 
 
 @kernel

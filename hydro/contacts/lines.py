@@ -17,7 +17,8 @@ class LineNodes(NamedTuple):
     line: at the start of the step; new: at its end; further: after some steps like it; inner: the
     next nodes inwards, at its start; boxes, swept (4, groups): around `group` faces each, of the
     line and of its way to `further`.  mirrored (2,): whether the end is on a plane, in which the
-    line goes on as its mirror image.
+    line goes on as its mirror image; beyond (2, 2): the next nodes of the body's outline beyond
+    both ends, at its start.
     """
 
     line: np.ndarray
@@ -27,6 +28,7 @@ class LineNodes(NamedTuple):
     boxes: np.ndarray
     swept: np.ndarray
     mirrored: np.ndarray
+    beyond: np.ndarray
     group: int
 
 
@@ -34,7 +36,8 @@ def make_line_nodes(faces: int, group: int) -> LineNodes:
     """Arrays for a line of so many faces, with a box for each `group` of them."""
     nodes = (np.zeros((2, faces + 1)) for _ in range(4))
     boxes = (np.zeros((4, -(-faces // group))) for _ in range(2))
-    return LineNodes(*nodes, *boxes, mirrored=np.zeros(2, dtype=np.bool_), group=group)
+    mirrored = np.zeros(2, dtype=np.bool_)
+    return LineNodes(*nodes, *boxes, mirrored, beyond=np.zeros((2, 2)), group=group)
 
 
 @compiled_once

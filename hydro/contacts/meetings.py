@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.block import Block
+from shockgrid.hydro.contacts.overlap import Overlaps
 from shockgrid.hydro.contacts.pair import Pair, PlanePair
 from shockgrid.hydro.contacts.parting import Bodies
 from shockgrid.hydro.contacts.start import fill_normals
@@ -26,6 +27,7 @@ from shockgrid.hydro.facets.states import make_add_facet_flux
 from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.links import Link
 from shockgrid.hydro.motion.grid_motion import GridMotion
+from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.perimeter.contacts import PISTON
 from shockgrid.hydro.rim import AT_FACE, RHO_FACE, RHO_TRACE, TRACE
 from shockgrid.hydro.sliding.contact import SlidingContact
@@ -73,12 +75,14 @@ class Meetings:
             if (folding_pairs := [pair for pair in self.pairs if pair.one_block is block])
         ]
         self.bodies = Bodies(self.surfaces, _find_bodies(blocks, links))
+        self.overlaps = Overlaps(self.bodies)
         self.voids = Voids(self.surfaces, self.pairs, geometry.curved, void_fill)
         self.with_facets: list[Pair] = []  # with facets
         self.with_pins: list[Pair] = []  # with pins
         self._met: list[Surface] = []  # that have lain on others
         self._sides: list[Surface] = []  # of the near pairs, and their walls
         self._walls: list[Surface] = []
+        self._covered_ends: list[KeyNode] = []  # beside closed facets in this step
         self._facets_are_current = False  # the present grid's facets?
         self._least_clearance = 0.0  # all lines are further apart; not above 0 if a pair is near
         self._moved_since = 0.0  # by so much clearances may have fallen since they were measured
@@ -154,12 +158,20 @@ class Meetings:
 
     def fill_speeds(self, t: float, dt: float) -> None:
         """Contact states from the traces, with which the lines move."""
+        if self._covered_ends:
+            self._forget_covered_ends()
         if self.with_facets:
             self._set_velocities(t)
             for surface in self._solve(TRACE):
                 surface.put_cover(RHO_TRACE)
+                self._covered_ends += surface.cover_ends()
             for pair in self.with_facets:
                 pair.find_held()
+
+    def _forget_covered_ends(self) -> None:
+        for key_node in self._covered_ends:
+            key_node.covered.clear()
+        self._covered_ends.clear()
 
     def meet(self, dt: float, stable_dt: float) -> float | None:
         """Lay the new lines on each other, or return the step [s] that ends with the first touch.
@@ -339,16 +351,19 @@ class Meetings:
         self._least_clearance = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
 
     def _measure_overlaps(self) -> None:
-        """How much of bodies lies in others, all pairs together, in cells of the finer of both."""
-        met = [pair for pair in self.pairs if pair.has_hits or pair in self.with_pins]
-        pairs = [pair for pair in met if not isinstance(pair, PlanePair)]
-        for surface in {s for pair in pairs for s in (pair.leader, pair.follower)}:
-            surface.read_accepted()
-        for pair in pairs:
-            area = pair.measure_overlap()
-            if area > 0.0:
-                cell = min(pair.leader.measure_cell(), pair.follower.measure_cell())
-                self.overlap += area / cell
+        """How much of bodies lies in others, all together, in cells of the finer of both."""
+        cells: dict[tuple[int, int], float] = {}
+        for pair in self.pairs:
+            met = pair.has_hits or pair in self.with_pins
+            if not met or pair.one_body or isinstance(pair, PlanePair):
+                continue
+            both = pair.leader, pair.follower
+            numbers = tuple(sorted(self.bodies.get_number(surface) for surface in both))
+            cell = min(surface.measure_cell() for surface in both)
+            cells[numbers] = min(cell, cells.get(numbers, np.inf))
+        areas = self.overlaps.measure(list(cells)) if cells else []
+        for area, cell in zip(areas, cells.values(), strict=True):
+            self.overlap += area / cell
 
     # --- parts -----------------------------------------------------------------------------------
 

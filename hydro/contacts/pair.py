@@ -10,9 +10,7 @@ from shockgrid.hydro.contacts.facets import (
     find_deepest,
     find_pins,
     follow_pins,
-    measure_depths,
     measure_facets,
-    sum_behind,
 )
 from shockgrid.hydro.contacts.friction import add_friction, measure_closed
 from shockgrid.hydro.contacts.laying import (
@@ -40,8 +38,6 @@ from shockgrid.hydro.motion.overlaps import is_inside
 from shockgrid.hydro.rows import END_INDEX
 from shockgrid.regrid.errors import Place, RegridFailure
 
-DEEPEST_FACES = 2.0  # longest faces: so far behind a line nodes are looked for
-DOUBTED_DEPTH_PART = 0.01  # of a face's length: nodes so deep may be beyond a thin body
 MOST_BEHIND = 0.5  # of a face's length: lines that cross so far have lost each other
 ROUND_OFF_PRESSURE = 1e-12  # part of rho c² by which a pressure below that of the void is rounding
 FAR_SEARCH_FACES = 2.0  # longest faces: surfaces of one body are not looked for further off
@@ -206,32 +202,6 @@ class Pair:
             ):
                 return surface, other_surface, int(node)
         return None
-
-    def measure_overlap(self) -> float:
-        """Area [m²] of one body that lies in the other after an accepted step.
-
-        By the nodes of that line which has more in the other body.  0 for surfaces of one body.
-        The surfaces have read what was accepted.
-        """
-        if self.one_body:
-            return 0.0
-        areas = []
-        for half, other_half in self.halves:
-            surface = half.surface
-            other_surface = other_half.surface
-            reach = (
-                DEEPEST_FACES * other_surface.longest
-                + surface.largest_displacement
-                + other_surface.largest_displacement
-            )
-            depths = np.empty(surface.count + 1)
-            measure_depths.entry(surface.nodes, other_surface.nodes, reach, depths)
-            # behind a line, yet beyond the other side of a thin body, is not in it
-            for node in np.flatnonzero(depths > DOUBTED_DEPTH_PART * other_surface.longest):
-                if not is_inside(tuple(surface.new[:, node]), other_surface.block.nodes):
-                    depths[node] *= -1.0
-            areas.append(sum_behind(surface.new, depths))
-        return max(areas)
 
     def _measure_clearance(self) -> float:
         longest = max(self.leader.longest, self.follower.longest)

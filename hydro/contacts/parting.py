@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shockgrid.hydro.contacts.facets import faces_each_other, find_depth, lies_away
+from shockgrid.hydro.contacts.facets import (
+    LEAST_FACING,
+    faces_each_other,
+    find_depth,
+    lies_away,
+)
 from shockgrid.hydro.contacts.surface import Surface
 from shockgrid.hydro.facets.lines import compute_normal, measure_square, project
 from shockgrid.hydro.motion.key_nodes import KeyNode
@@ -27,7 +32,6 @@ MOST_ROUNDS = 20  # of pushing all nodes that lie too deep
 DEEPEST_NODE_PART = 0.05
 LEFT_DEPTH_PART = 1e-3
 SEARCHED_DEPTH_FACES = 1.0  # longest ones: a node deeper than that is not found
-LEAST_FACING = 0.1  # cosine of the angle between the normals of two faces that look at each other
 NO_FACE = -1
 
 
@@ -250,6 +254,7 @@ class Bodies:
 
     def __init__(self, surfaces: Sequence[Surface], bodies: Mapping[int, int]):
         self.surfaces = surfaces
+        self._numbers = bodies
         firsts = np.cumsum([0, *(surface.count + 1 for surface in surfaces)])
         self.spans = [slice(a, b) for a, b in itertools.pairwise(firsts.tolist())]
         count = int(firsts[-1])
@@ -296,8 +301,16 @@ class Bodies:
                     outlines.weights[[node, twin]] = 0.0  # its image, a period away
                     continue
                 outlines.twins[[node, twin]] = twin, node
+                other_surface = self.find_surface(twin)
+                other_node = twin - self.spans[self.surfaces.index(other_surface)].start
+                surface.go_on(node - span.start, other_surface, other_node)
+                other_surface.go_on(other_node, surface, node - span.start)
                 for faces in (outlines.before, outlines.after):
                     faces[[node, twin]] = max(faces[node], faces[twin])
+
+    def get_number(self, surface: Surface) -> int:
+        """The number of the body that a surface belongs to."""
+        return self._numbers[id(surface.block)]
 
     def read(self) -> None:
         """Take up the present nodes."""

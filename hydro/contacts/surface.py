@@ -13,13 +13,14 @@ from shockgrid.hydro.contacts.laying import fit_plane
 from shockgrid.hydro.contacts.lines import make_line_nodes
 from shockgrid.hydro.contacts.touch import fill_inner, measure_way
 from shockgrid.hydro.facets.lines import fill_line_slopes, fill_squares
-from shockgrid.hydro.facets.rows import make_line_arrays
+from shockgrid.hydro.facets.rows import WEIGHT, make_line_arrays
 from shockgrid.hydro.motion.key_nodes import KeyNode
 from shockgrid.hydro.motion.line import Role
 from shockgrid.hydro.motion.sides import Sides
 from shockgrid.hydro.motion.smoothing import SurfaceLine
 from shockgrid.hydro.perimeter.contacts import PISTON, fill_ghosts_from_faces, flow_along
 from shockgrid.hydro.rim import FLUX, LENGTH, P_STAR, RHO, SWEPT, VOID_P
+from shockgrid.hydro.rows import END_INDEX
 from shockgrid.regrid.measure.crossings import GROUP_EDGES, fill_boxes
 from shockgrid.regrid.sides import SIDE_NAMES, find_node, trace_outline
 
@@ -53,6 +54,8 @@ class Surface:
         self.friction = np.inf if self.rigid else float(getattr(segment, "friction", 0.0))
         self.largest_displacement = 0.0  # of the node that goes furthest in this step
         self.thick: SurfaceLine | None = None  # once it has met another one
+        # where the body's outline goes on beyond both ends, a node of a block: along the next side
+        self._beyond = [(self.block, *self._find_node(node, 1)) for node in (0, self.count)]
         self.moving_line = next(line for line in sides.lines if line.segment is segment)
         self.read()
         self.length = float(np.hypot(*np.diff(self.line)).sum())
@@ -60,12 +63,22 @@ class Surface:
 
     def _find_key_node(self, key_nodes: list[KeyNode], node: int) -> KeyNode | None:
         """The key node at the line's first or last node."""
-        place = self.segment.stop - node if self.back else self.segment.start + node
-        i, j = find_node(self.side, place, 0, self.block.ni, self.block.nj)
+        i, j = self._find_node(node)
         for key_node in key_nodes:
             if any(b is self.block and (p, q) == (i, j) for b, p, q in key_node.members):
                 return key_node
         return None
+
+    def _find_node(self, node: int, layer: int = 0) -> tuple[int, int]:
+        """Where in its block a node of the line is, or the one so many layers inwards of it."""
+        place = self.segment.stop - node if self.back else self.segment.start + node
+        return find_node(self.side, place, layer, self.block.ni, self.block.nj)
+
+    def go_on(self, node: int, other_surface: Surface, other_node: int) -> None:
+        """Beyond its end `node` the outline of the body goes on from another surface's end."""
+        next_node = 1 if other_node == 0 else other_surface.count - 1
+        beyond = other_surface.block, *other_surface._find_node(next_node)
+        self._beyond[0 if node == 0 else 1] = beyond
 
     @property
     def has_met(self) -> bool:
@@ -101,6 +114,11 @@ class Surface:
         fill_boxes(self.line, self.group, self.nodes.boxes)
         self.longest = fill_squares(self.line, self.arrays.squares)
         self.fill_inner(self.inner)
+        self._read_beyond()
+
+    def _read_beyond(self) -> None:
+        for end, (block, i, j) in enumerate(self._beyond):
+            self.nodes.beyond[:, end] = block.nodes[:, i, j]
 
     def fill_inner(self, inner: np.ndarray) -> None:
         """Fill the next nodes inwards (2, n + 1) of the present ones."""
@@ -177,6 +195,17 @@ class Surface:
     def put_cover(self, state: int) -> None:
         """Put contact states over those of the free surface."""
         cover_surface(self.arrays.sums, self.start, self.step, state, self.block.rim.rows)
+
+    def cover_ends(self) -> list[KeyNode]:
+        """Tell the key nodes at its ends which part of the face there is covered; those told."""
+        told = []
+        for end, key_node in enumerate(self.ends):
+            part = float(self.arrays.sums[WEIGHT, END_INDEX[end]])
+            if key_node is not None and part > 0.0:
+                face = self.start + self.step * (self.count - 1) * end
+                key_node.covered.append((self.block, face, min(1.0, part)))
+                told.append(key_node)
+        return told
 
     def read_flux(self) -> None:
         """Take up the flux with which the free surface is filled."""

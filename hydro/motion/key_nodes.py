@@ -43,6 +43,8 @@ class KeyNode:
         self.flowing: list[tuple[Block, int]] = []
         self.seams: list[tuple[Block, int]] = []
         self.constraining_faces: list[tuple[Block, int]] = []
+        # of the faces that lie on another body in this step: block, face, which part of it does
+        self.covered: list[tuple[Block, int, float]] = []
         self.is_tied = False  # an end of a carried seam, which moves it
         self.on_piston = False  # a moving line ends on a straight piston and slides along it
         # sine of the angle from which two lines that hold the node are two
@@ -126,10 +128,33 @@ class KeyNode:
     def _flow(self) -> tuple[float, float]:
         """Contact velocity of the moving faces around, and what damps their lines."""
         x, y = _mean_contact_velocity(self.flowing)
+        if self.covered and len(self.flowing) == 2:
+            x, y = self._keep_to_contacts(x, y)
         for damping in self.damping:
             x += float(damping[0]) / len(self.damping)
             y += float(damping[1]) / len(self.damping)
         return x, y
+
+    def _keep_to_contacts(self, x: float, y: float) -> tuple[float, float]:
+        """The velocity (x, y) of a corner with the contact speed across each face in contact.
+
+        The mean of both faces' velocities has half of each speed, and half of how fast the
+        material spreads along the other face: corners of bodies that touch would pass each other.
+        The part of the missing speeds that is made up is the squared sine of the corner.
+        """
+        normals = []
+        missing = []
+        for block, face in self.flowing:
+            area_x, area_y = float(block.rim.nx[face]), float(block.rim.ny[face])
+            length = math.hypot(area_x, area_y)
+            normals.append((area_x / length, area_y / length))
+            speed_x, speed_y = float(block.rim.u_star[face]) - x, float(block.rim.v_star[face]) - y
+            part = sum(c for b, k, c in self.covered if b is block and k == face)
+            missing.append(part * (speed_x * area_x + speed_y * area_y) / length)
+        (first_x, first_y), (second_x, second_y) = normals
+        cosine = first_x * second_x + first_y * second_y
+        first, second = missing[0] - cosine * missing[1], missing[1] - cosine * missing[0]
+        return x + first * first_x + second * second_x, y + first * first_y + second * second_y
 
     def lies_on_one_piston(self, walls: bool) -> bool:
         """Whether all pistons at the node lie on one line; with `walls`, the lines that hold it as

@@ -170,3 +170,39 @@ def test_overlap_of_bodies_is_measured():
     meetings.accept()
     # the edge goes down at both of its ends, where its body is 10 cells wide
     assert meetings.overlap == pytest.approx(0.3 * 10.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("materials", "lean"),
+    [(("Al1100", "SS304"), 0.0), (("SS304", "Al1100"), 0.3), (("Cu", "Cu"), -0.5)],
+)
+def test_corners_at_a_joint_do_not_pass_each_other(materials, lean):
+    """A body falls on the joint of two that touch: the pressure drives both corners apart.
+
+    Each of them has the speed of the contact across the joint, not that with which the material
+    beneath the falling body spreads.  lean: of the joint.
+    """
+    faces = 6
+    size = faces * CELL
+    left = make_body(
+        "left", materials[0], box((-size, -size), (0.0, 0.0), (6, 6)), material="metal"
+    )
+    right = make_body(
+        "right", materials[1], box((0.0, -size), (size, 0.0), (6, 6)), material="metal"
+    )
+    for body in (left, right):
+        body.nodes[0] += lean * body.nodes[1] * (1.0 - np.abs(body.nodes[0]) / size)
+    fallen = box((-4.0 * CELL, 1e-2 * CELL), (4.0 * CELL, 4.0 * CELL), (9, 4))
+    drop = make_body("drop", "Cu", fallen, 0.0, -500.0, material="metal")
+    for body in (left, right, drop):
+        free(body, *SIDES)
+    simulation = Simulation([left, right, drop], [], t_end=0.2e-6)
+    across = np.array([1.0, -lean]) / np.hypot(1.0, lean)
+    gaps = []
+    rows = [simulation.start_row()]
+    while not simulation.finished:
+        rows.append(simulation.advance())
+        gaps.append(across @ (right.nodes[:, 0, -1] - left.nodes[:, -1, -1]) / CELL)
+    assert min(gaps) > -0.01
+    assert max(row["contact_overlap"] for row in rows[1:]) < 0.1
+    check_budget(rows, names=("momentum_y", "energy"))

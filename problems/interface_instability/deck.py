@@ -72,6 +72,13 @@ class InterfaceDeck(SolidDeck, kw_only=True):
     ) = None
     shock_pressure: key(float | None, "behind the shock [Pa]", ge=1e-12, le=1e20) = None
     second_shock: SecondShock | None = None
+    diffusion_thickness: key(
+        float,
+        "of a layer between the materials, in which the density is graded: jump of the density "
+        "over its steepest gradient [m]; 0: none",
+        ge=0,
+        le=1e12,
+    ) = 0.0
     wavelength: key(float, "2 pi / k [m]", ge=1e-12, le=1e12) = 1.0
     modes: key(list[Mode], "harmonics; [] for a spectrum or a line_file alone") = msgspec.field(
         default_factory=lambda: [Mode()]

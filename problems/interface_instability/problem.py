@@ -59,6 +59,7 @@ from shockgrid.problems.interface_instability.zone import (
     measure_zone,
 )
 from shockgrid.problems.problem import BlockPlan, Problem
+from shockgrid.problems.references.diffuse_layers import mix_densities
 from shockgrid.problems.references.hugoniot import (
     Shock,
     shock_to_pressure,
@@ -69,6 +70,7 @@ from shockgrid.problems.references.linear_growth import LinearGrowth, compute_li
 from shockgrid.problems.solids import find_laws
 from shockgrid.regrid.compilation.first_calls import is_interpreting
 from shockgrid.regrid.errors import BadInput
+from shockgrid.regrid.measure.corners import compute_centres
 from shockgrid.regrid.measure.quality import find_bad_cells
 from shockgrid.regrid.roots import find_root
 
@@ -81,6 +83,8 @@ LAYER_PART = 0.1875  # of the shortest wave, to the nearer front at a start afte
 LEAST_LAYER_CELLS = 3.0
 CLEAR_LAYER_CELLS = 8.0  # that keep a captured front clear of the interface
 COARSE_LAYER_PART = 0.25  # of a wave of few cells, up to CLEAR_LAYER_CELLS
+# diffusion thicknesses of a layer to the shock and the far sides: nothing of it is as far away
+CLEAR_THICKNESSES = 2.0
 FAR_FIELD_PART = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
@@ -151,6 +155,7 @@ class InterfaceInstability(Results, Problem):
         if self.may_hand_over:
             self.units |= ZONE_UNITS
         self._check_handover()
+        self._check_diffuse_layer()
         self.start = self._choose_start()
         self.begun = arrival + self._choose_since() if self.start == "crossed" else 0.0
         self.arrival = arrival - self.begun
@@ -185,6 +190,31 @@ class InterfaceInstability(Results, Problem):
             raise deck.error(
                 "line.tension",
                 f"{name} lays both materials on one grid, where no line has a tension",
+            )
+
+    def _check_diffuse_layer(self) -> None:
+        """Raise BadInput for keys that a layer of graded density cannot have."""
+        deck = self.deck
+        width = CLEAR_THICKNESSES * deck.diffusion_thickness
+        if not width:
+            return
+        if deck.start == "crossed":
+            raise deck.error(
+                "start",
+                "linear theory has no state for a layer of graded density (diffusion_thickness); "
+                "take 'incident'",
+            )
+        if width > deck.gap * deck.wavelength:
+            raise deck.error(
+                "gap",
+                f"the shock begins inside the layer of graded density; take at least "
+                f"{width / deck.wavelength:.4g}",
+            )
+        if deck.lengths is not None and min(deck.lengths) <= width + self.amplitude:
+            raise deck.error(
+                "lengths",
+                f"the layer of graded density reaches the far side; each must be greater than "
+                f"{width + self.amplitude:.4g}",
             )
 
     @functools.cached_property
@@ -222,7 +252,8 @@ class InterfaceInstability(Results, Problem):
             limiter=self.deck.limiter,
             carried=fields,
         )
-        self._bound_ends((block, 1.0), (block, 0.0))
+        # without lengths of the deck both ends go with the interface, so that the even cells do
+        self._bound_ends((block, 1.0), (block, 0.0), self.deck.lengths is None)
         links = []
         if self.deck.sides == "periodic":
             links.append(join("periodic", (block, "j_min"), (block, "j_max")))
@@ -239,7 +270,7 @@ class InterfaceInstability(Results, Problem):
 
         Raises BadInput where the deck asks for what cannot be.
         """
-        if self.deck.start == "incident":
+        if self.deck.start == "incident" or self.deck.diffusion_thickness > 0.0:
             return "incident"
         base = self.theory.base
         lengths = self.deck.lengths
@@ -548,7 +579,7 @@ class InterfaceInstability(Results, Problem):
         """Blocks at the start: the shock, run in, `gap` waves before the interface or beyond it."""
         deck = self.deck
         grids = self.make_grids()
-        blocks, links, make_regridder = self.assemble(grids, self._make_states(grids[0]))
+        blocks, links, make_regridder = self.assemble(grids, self._make_states(grids))
         del grids  # the blocks have them
         refining = None
         if deck.refine:
@@ -569,8 +600,8 @@ class InterfaceInstability(Results, Problem):
             simulation.hand_over()
         return simulation
 
-    def _make_states(self, grid: np.ndarray) -> Sequence:
-        """rho, u, v, p of the cells of both blocks, the first of which has this grid."""
+    def _make_states(self, grids: Sequence[np.ndarray]) -> Sequence:
+        """rho, u, v, p of the cells of both blocks, which have these grids."""
         deck = self.deck
         if self.start == "crossed":
             return self.crossed.make_states()
@@ -578,8 +609,19 @@ class InterfaceInstability(Results, Problem):
         position = -(deck.gap * deck.wavelength + self.amplitude)
         choice = {"cfl": deck.run.cfl, "limiter": deck.limiter}
         shock = settle_shock(self.eos_first, spacing, position, self.shock, **choice)
-        rho, u, p = shock.lay_on(grid)
-        return (rho, u, 0.0, p), (self.rho_second, 0.0, 0.0, deck.pressure)
+        rho, u, p = shock.lay_on(grids[0])
+        rho_second = self.rho_second
+        if deck.diffusion_thickness > 0.0:
+            layer_first, layer_second = map(self._grade_density, grids)
+            rho = rho + layer_first - self.rho_first
+            rho_second = layer_second
+        return (rho, u, 0.0, p), (rho_second, 0.0, 0.0, deck.pressure)
+
+    def _grade_density(self, grid: np.ndarray) -> np.ndarray:
+        """Density (ni, nj) of the diffuse layer in the cells of a grid."""
+        x, y = compute_centres(grid)
+        rho = self.rho_first, self.rho_second
+        return mix_densities(x - self.shape(y), self.deck.diffusion_thickness, rho)
 
     def assemble(self, grids, states) -> tuple[list[Block], list[Link], Callable[[], object]]:
         """Both blocks on their first grids with states rho, u, v, p, between the piston and the
@@ -603,7 +645,7 @@ class InterfaceInstability(Results, Problem):
         if deck.line.contact == "bonded":
             contact["bonded"] = True
         links = [join("interface", (first, "i_max"), (second, "i_min"), **contact)]
-        self._bound_ends((first, None), (second, None))
+        self._bound_ends((first, None), (second, None), self.has_open_ends)
         if deck.sides == "periodic":
             links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]
         put_walls(*blocks)
@@ -613,12 +655,12 @@ class InterfaceInstability(Results, Problem):
         choices = iter([self.choose_family(block.nodes) for block in blocks])
         return blocks, links, lambda: deck.regrid.make(threads=deck.run.threads, **next(choices))
 
-    def _bound_ends(self, low: tuple, high: tuple) -> None:
+    def _bound_ends(self, low: tuple, high: tuple, are_open: bool) -> None:
         """Put what bounds the far sides of two blocks, or of one: open ends, or the piston.
 
         low, high: a block, and what its material there has of the fractions, None without these.
         """
-        if not self.has_open_ends:
+        if not are_open:
             put(low[0], "i_min", "piston", velocity=self.make_piston())
             return
         shock = self.shock

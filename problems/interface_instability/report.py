@@ -139,8 +139,11 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     head = f"mode {mode.number}: " if several else ""
     label = f"{head}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}" if shown else ""
     rate = growth.measure_rate(column, mode, window.first, window.last)
-    expected = float(theory.get_mean_rate(window.first, window.last))
+    reduction = growth.find_reduction(mode.number)
+    expected = float(theory.get_mean_rate(window.first, window.last)) / reduction
     source = "linear compressible theory"
+    if reduction != 1.0:
+        source += f" over psi = {reduction:.4g} of the graded layer"
     if theory.error > SAID_THEORY_ERROR:
         source += f" (its own error up to {100.0 * theory.error:.1g} %)"
     if not window.linear:
@@ -162,6 +165,7 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     times = mode.number * get_kct(growth.problem, column["t"])
     size = float(np.interp(window.last, times, column[mode.column])) / mode.amplitude
     size_expected = float(predict_amplitude(theory, window.last))
+    size_expected = theory.compression + (size_expected - theory.compression) / reduction
     size_label = f"{head}a / a0 at k c t = {window.last:.3g}" if shown else ""
     missing = {"off": f"{100.0 * (size - size_expected):+.2f} % of a0", "source": "the same theory"}
     return [
@@ -215,8 +219,11 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
     several = len(curves) > 1
     for n, curve in enumerate(curves):
         dashes = {"color": f"C{n}" if several else "k", "ls": "--"}
-        amplitude.plot(kct[known], predict_amplitude(theory, curve.number * kct[known]), **dashes)
-        rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t), **dashes)
+        reduction = growth.find_reduction(curve.number)
+        pressed = theory.compression
+        grown = predict_amplitude(theory, curve.number * kct[known]) - pressed
+        amplitude.plot(kct[known], pressed + grown / reduction, **dashes)
+        rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t) / reduction, **dashes)
     label = "linear compressible"
     modes = len(problem.harmonics) > 1
     label += ", waves couple" if modes and reach == 0.0 else ""

@@ -31,6 +31,7 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.eos.base import is_same_material
 from shockgrid.hydro.formulas.reconstruction import LOW_MACH
 from shockgrid.problems.interface_instability.line import Harmonic
+from shockgrid.problems.references.diffuse_layers import compute_growth_reduction
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.linear_growth import LinearGrowth, PadeModel
 
@@ -94,6 +95,20 @@ class Growth:
         modes = self.problem.harmonics
         wavenumber = self.problem.k
         return sum(abs(mode.number * wavenumber * mode.amplitude) for mode in modes)
+
+    def find_reduction(self, number: int) -> float:
+        """psi by which a mode grows more slowly on a layer of graded density; 1 without one.
+
+        The layer is pressed together as the materials on both sides are, by their mean.
+        """
+        problem = self.problem
+        thickness = problem.deck.diffusion_thickness
+        if not thickness:
+            return 1.0
+        base = self.theory.base
+        pressed = 0.5 * (problem.rho_first / base.rho_left + problem.rho_second / base.rho_right)
+        slope = number * problem.k * thickness * pressed
+        return compute_growth_reduction(self.theory.atwood, slope)
 
     @property
     def limit(self) -> float:
@@ -204,6 +219,7 @@ class Growth:
         wavenumber = mode.number * self.problem.k
         start = abs(mode.amplitude)
         rate = abs(theory.get_asymptotic_rate()) * wavenumber * start
+        rate /= self.find_reduction(mode.number)
         return PadeModel(wavenumber, start * theory.compression, rate, theory.atwood)
 
     @property

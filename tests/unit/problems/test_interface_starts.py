@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from shockgrid.hydro.rows import RHO
 from shockgrid.problems.deck import RunControl
 from shockgrid.problems.interface_instability.crossed_start import find_nearer_speed
 from shockgrid.problems.interface_instability.deck import Fluid, InterfaceDeck, SecondShock
@@ -232,3 +233,36 @@ def test_finer_cells_of_a_passage_begin_and_end_to_grow_gradually(cells, finer):
     assert steps[0] * finer == pytest.approx(1.0 / cells, rel=0.05)
     assert growth.min() > 0.999 and growth.max() <= PASSAGE_CELL_GROWTH
     assert np.abs(np.diff(growth)).max() < 0.3 * (PASSAGE_CELL_GROWTH - 1.0)
+
+
+LAYER = 0.1
+
+
+def make_layer(**deck) -> InterfaceInstability:
+    return InterfaceInstability(
+        InterfaceDeck(**{"cells": 32, "diffusion_thickness": LAYER, "kct_end": 5.0, **deck})
+    )
+
+
+def test_a_diffuse_layer_grades_the_density_of_both_materials():
+    problem = make_layer()
+    assert problem.start == "incident"
+    first, second = problem.build().blocks
+    rho_before = first.state[RHO, -2, 1:-1]
+    rho_beyond = second.state[RHO, 1, 1:-1]
+    steepest = (rho_beyond - rho_before) / (second.centres[0][0] - first.centres[0][-1])
+    jump = problem.rho_second - problem.rho_first
+    np.testing.assert_allclose(steepest, jump / LAYER, rtol=0.01)
+    np.testing.assert_allclose(0.5 * (rho_before + rho_beyond), 2.0, rtol=1e-3)
+    # far from the layer: the shock's density, and the second material's
+    assert first.state[RHO, 1, 1] == pytest.approx(problem.shock.rho, rel=1e-12)
+    np.testing.assert_allclose(second.state[RHO, -2, 1:-1], problem.rho_second, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "deck",
+    [{"start": "crossed"}, {"gap": 0.15}, {"lengths": (0.9, 0.2)}],
+)
+def test_a_diffuse_layer_needs_room_and_the_incident_shock(deck):
+    with pytest.raises(BadInput, match="layer of graded density"):
+        make_layer(**deck)

@@ -8,6 +8,11 @@ import pytest
 
 from shockgrid.hydro.eos import IdealGas, MieGruneisen
 from shockgrid.hydro.eos.materials import find_material
+from shockgrid.problems.references.diffuse_layers import (
+    compute_growth_reduction,
+    compute_steady_reduction,
+    mix_densities,
+)
 from shockgrid.problems.references.hugoniot import make_isentrope, shock_with_mach
 from shockgrid.problems.references.linear_growth import PadeModel, compute_linear_growth
 from shockgrid.problems.references.perturbed_layers import (
@@ -210,3 +215,34 @@ def test_perturbed_fields_at_a_start_do_not_depend_on_the_cut():
         inside = speeds < 0.99 * side.zones[-2].speed[-1]
         found = interpolate_zones(layer.speed, field[None], speeds)[0]
         assert np.abs(found - exact)[inside].max() < 1e-3 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("slope", [0.005, 0.05])
+@pytest.mark.parametrize(
+    ("compute", "thin"),
+    [
+        (compute_growth_reduction, 1.0 / math.pi),
+        (compute_steady_reduction, math.sqrt(2.0) / math.pi),
+    ],
+)
+def test_growth_on_a_thin_layer(compute, thin, slope):
+    """psi - 1 at A = 0: the mean of k |x|, and of k |x - x'|, over the gradient of the density."""
+    assert compute(1e-6, slope) - 1.0 == pytest.approx(thin * slope, rel=0.05)
+    assert compute(-1e-6, slope) == compute(1e-6, slope)
+
+
+def test_growth_on_a_thick_layer_is_slower_and_slower():
+    slopes = (0.0, 0.02, 0.3, 1.0, 3.0)
+    for compute in (compute_growth_reduction, compute_steady_reduction):
+        psi = [compute(0.7, slope) for slope in slopes]
+        assert psi[0] == 1.0
+        assert psi == sorted(psi)
+    assert compute_steady_reduction(0.7, 1.0) > compute_growth_reduction(0.7, 1.0)
+
+
+def test_diffuse_density_has_its_thickness():
+    x = np.array([-1e-7, 0.0, 1e-7, -1.0, 1.0])
+    rho = mix_densities(x, 2e-3, (1.0, 5.0))
+    assert rho[1] == 3.0
+    assert (rho[2] - rho[0]) / 2e-7 == pytest.approx(4.0 / 2e-3, rel=1e-6)
+    assert rho[3:].tolist() == [1.0, 5.0]

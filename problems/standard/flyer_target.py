@@ -2,8 +2,9 @@
 
 Plates of given materials stand in a row with gaps between them; the first one has a speed.  Where
 plates meet a contact closes; it opens again where it would go into tension, so plates separate by
-themselves (theory F16).  A plate without a gap touches the one before it from the start, as a
-window does behind a target: that is no impact.  `bond` is the tension that contacts hold; that of a
+themselves (theory F16).  The first plates, as many as `flyers` says, move together.  A plate
+without a gap touches the one before it from the start, as a window does behind a target: that is no
+impact.  `bond` is the tension that contacts hold; that of a
 plate is of its contact with the plate before it.
 
 The problem measures the mean speed of every plate and the speed of the last plate's free surface,
@@ -11,14 +12,17 @@ as a velocity interferometer sees it.  Theory gives the time of impact and, by t
 isentrope of each material, pressure and speed at the impact; for two plates also when the shock
 reaches the free surface, the speed of the surface then, and how long it lasts, because the release
 from the flyer's back follows the shock.  For a third plate without a gap, a window, theory gives
-the speed and the pressure of its face behind the target.
+the speed and the pressure of its face behind the target.  With `trace` the speed of the surface
+that is observed, the window's face or else the free surface, is compared with a measured one.  For
+solids of the law `perfect` theory is the exact stress behind the impact.
 
 Note: a release is sharp at low speeds, and the scheme spreads it over some cells; plates then
 separate a little early.  Use cells of an eightieth of the thinnest plate or less.
 """
 
+import functools
 import math
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -27,11 +31,26 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos.materials import find_material
 from shockgrid.problems.deck import MOST_CELLS, Regrid, RunControl, VoidFill, key
 from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.measured_traces import (
+    MeasuredTrace,
+    Source,
+    compare_trace,
+    draw_trace,
+    say_spread,
+)
 from shockgrid.problems.pictures import draw_columns
 from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
+from shockgrid.problems.references.elastic_plastic import compute_impact
 from shockgrid.problems.references.exact_flows import compute_plate_impact, compute_window_impact
 from shockgrid.problems.references.hugoniot import caution_fit
-from shockgrid.problems.solids import BodyTable, SolidDeck, find_laws, list_fluids
+from shockgrid.problems.solids import (
+    BodyTable,
+    SolidDeck,
+    find_laws,
+    find_stress,
+    idealise,
+    list_fluids,
+)
 
 
 class PlateTable(BodyTable, kw_only=True):
@@ -56,7 +75,11 @@ class FlyerTargetDeck(SolidDeck, kw_only=True):
     regrid: Regrid = Regrid()
     speed: key(float, "of the first plate [m/s]", ge=1e-12, le=1e5) = 1000.0
     plates: key(tuple[PlateTable, ...], "from left to right", min_length=2, max_length=12) = PLATES
+    flyers: key(int, "how many of the first plates move with the speed", ge=1, le=11) = 1
     rows: key(int, "cells along the plates", ge=2, le=MOST_CELLS) = 2
+    backing: key(Literal["free", "rigid"], "what is behind the last plate") = "free"
+    trace: MeasuredTrace = ()
+    source: Source = "measured"
     void_fill: VoidFill = VoidFill()
     bond: key(float, "tension that contacts hold [Pa]", ge=0, le=1e20) = 0.0
 
@@ -73,24 +96,49 @@ class FlyerTarget(Problem):
         self.units = type(self).units | {
             f"speed_plate-{number}": "m/s" for number in range(1, len(deck.plates) + 1)
         }
-        first, second, *more = deck.plates
+        first = deck.plates[0]
         if first.gap:
             raise first.error("gap", "nothing is before the first plate, whose gap must be 0")
         if first.bond is not None:
             raise first.error("bond", "nothing is before the first plate; give it to the next one")
+        if deck.flyers >= len(deck.plates):
+            raise deck.error("flyers", "the last plate is what they hit, at rest")
         self.materials = [find_material(plate.material) for plate in deck.plates]
-        impact = deck.speed, second.gap, first.thickness, second.thickness
-        self.theory = compute_plate_impact(*self.materials[:2], *impact)
-        self.is_pair = not more
-        # contacts from the start on, besides that of the flyer
-        self.touching = sum(plate.gap == 0.0 for plate in more)
-        self.window = None
-        if more and more[0].gap == 0.0:
-            sizes = deck.speed, second.thickness, more[0].thickness
-            self.window = compute_window_impact(self.theory, *self.materials[:3], *sizes)
+        # the impact is between the last of the flyers and the target
+        flyer = deck.plates[deck.flyers - 1]
+        target = deck.plates[deck.flyers]
+        impact = deck.speed, target.gap, flyer.thickness, target.thickness
+        hit = self.materials[deck.flyers - 1 : deck.flyers + 1]
+        self.theory = compute_plate_impact(*hit, *impact)
+        self.is_pair = len(deck.plates) == 2
+        # contacts from the start on, besides that of the impact
+        others = [plate for plate in deck.plates[1:] if plate is not target]
+        self.touching = sum(plate.gap == 0.0 for plate in others)
         self.names = [f"plate-{number}" for number in range(1, len(deck.plates) + 1)]
+        behind = deck.plates[deck.flyers + 1 :]
+        self.has_window = bool(behind) and behind[0].gap == 0.0
         bodies = dict(zip(self.names, self.materials, strict=True))
         self.laws = find_laws(deck, bodies, dict(zip(self.names, deck.plates, strict=True)))
+        self.are_fluids = all(body.strength is None for body in self.laws.values())
+        self.window = None
+        if self.has_window and deck.flyers == 1 and self.are_fluids:
+            sizes = deck.speed, target.thickness, behind[0].thickness
+            self.window = compute_window_impact(self.theory, *self.materials[:3], *sizes)
+
+    @functools.cached_property
+    def impact_stress(self) -> float:
+        """Stress [Pa] behind the impact: of fluids the pressure; NaN for laws without an exact
+        one."""
+        if self.are_fluids:
+            return self.theory.pressure
+        sides = range(self.deck.flyers - 1, self.deck.flyers + 1)
+        laws = [self.laws[self.names[side]].strength for side in sides]
+        if any(law is not None and law.kind != "perfect" for law in laws):
+            return math.nan
+        solids = [
+            idealise(self.materials[side], law) for side, law in zip(sides, laws, strict=True)
+        ]
+        return compute_impact(*solids, self.deck.speed).stress
 
     def list_boxes(self):  # cells 8 times as high as the thinnest: square ones halve the time step
         rows = self.deck.rows
@@ -111,10 +159,13 @@ class FlyerTarget(Problem):
         bonds = zip(own, [*own[1:], deck.bond], strict=True)
         bodies = zip(self.make_grids().items(), self.materials, bonds, strict=True)
         for (name, nodes), material, pair in bodies:
-            state = material.rho0, 0.0 if blocks else deck.speed, 0.0, 0.0
+            speed = deck.speed if len(blocks) < deck.flyers else 0.0
+            state = material.rho0, speed, 0.0, 0.0
             options = {"material": name, **self.laws[name].options}
             blocks.append(Block(name, material.eos, nodes, *state, **options))
-            for side, bond in zip(("i_min", "i_max"), pair, strict=True):
+            is_backed = deck.backing == "rigid" and name == self.names[-1]
+            free_sides = ("i_min",) if is_backed else ("i_min", "i_max")
+            for side, bond in zip(free_sides, pair, strict=False):
                 put(blocks[-1], side, "free-surface", bond=bond)
             put_walls(blocks[-1])
         return self.simulate(blocks)
@@ -135,7 +186,8 @@ class FlyerTarget(Problem):
                 f"{self.theory.impact:.4g} s; take a later run.t_end, or a smaller gap"
             )
         hit = dict(zip((plate.material for plate in deck.plates), self.materials, strict=True))
-        for name in dict.fromkeys(plate.material for plate in deck.plates[:2]):
+        impact = deck.plates[deck.flyers - 1 : deck.flyers + 1]
+        for name in dict.fromkeys(plate.material for plate in impact):
             cautions += caution_fit(name, hit[name].eos, self.theory.pressure)
         return cautions + list_fluids(self.laws)
 
@@ -144,13 +196,23 @@ class FlyerTarget(Problem):
         states = [block.state[:, 1:-1, 1:-1] for block in evolution.blocks]
         for block, (rho, u, *_) in zip(evolution.blocks, states, strict=True):
             row[f"speed_{block.name}"] = float(np.average(u, weights=rho * block.volume))
-        meeting = 0.5 * (states[0][3, -1].mean() + states[1][3, 0].mean())  # of the first two
+        # of flyer and target, and of target and window
+        target = self.deck.flyers
+        sides = evolution.blocks[target - 1], evolution.blocks[target]
+        before, behind = (find_stress(block) for block in sides)
+        meeting = 0.5 * (before[-1].mean() + behind[0].mean())
         surface = float(states[-1][1, -1].mean())
         row |= {"free_surface_speed": surface, "contact_pressure": float(meeting)}
-        if self.window is not None:
-            face = 0.5 * (states[1][:, -1].mean(axis=1) + states[2][:, 0].mean(axis=1))
+        if self.has_window:
+            window = states[target + 1]
+            face = 0.5 * (states[target][:, -1].mean(axis=1) + window[:, 0].mean(axis=1))
             row |= {"window_speed": float(face[1]), "window_pressure": float(face[3])}
         return row
+
+    @property
+    def observed(self) -> str:
+        """The column of the speed that an interferometer sees."""
+        return "window_speed" if self.has_window else "free_surface_speed"
 
     def report(self, history, final=None) -> Report:
         deck = self.deck
@@ -166,20 +228,25 @@ class FlyerTarget(Problem):
         pressure = reduce_between(np.median, t, p, impact, until, 4)
         out, free, end = theory.read_trace(t, trace)
         ends = theory.end if theory.end < theory.ring else math.nan
+        name = "pressure" if self.are_fluids else "stress"
         rows = [
             Row("impact", impact, theory.impact, "time of impact [s]", digits=5),
-            Row("pressure", pressure, theory.pressure, "pressure [GPa]", 1e9, 5),
+            Row("pressure", pressure, self.impact_stress, f"{name} [GPa]", 1e9, 5),
             Row("out", out, theory.out, "arrival of the shock at the free surface [s]", digits=5),
             Row("free", free, theory.free, "speed of the free surface [m/s]", digits=5),
             Row("end", end, ends, "arrival of the release [s]", digits=5),
         ]
-        rows = [row for row in rows[: 5 if self.is_pair else 2] if not np.isnan(row.theory)]
+        rows = rows[: 5 if self.is_pair and self.are_fluids else 2]
+        rows = [row for row in rows if not np.isnan(row.theory)]
         if self.window is not None:
             rows += self.compare_window(history)
-        first = deck.plates[0]
-        notes = []
+        words = "window's face" if self.has_window else "free surface"
+        measured = compare_trace(history, self.observed, deck.trace, words, deck.speed, deck.source)
+        rows += measured
+        notes = say_spread(measured, deck.speed)
+        first = deck.plates[deck.flyers - 1]
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
-        if self.is_pair:
+        if self.is_pair and self.are_fluids:
             notes.append(f"behind the impact both plates move at {theory.u:.5g} m/s")
         for name in self.names if history else ():
             notes.append(f"{name} moves at {history[f'speed_{name}'][-1]:.5g} m/s at the end")
@@ -207,10 +274,12 @@ class FlyerTarget(Problem):
         ]
 
     def draw_flyer_target(self, figure, run_data) -> None:
-        """The free surface's speed beside theory."""
+        """The speed of the surface that is observed beside theory or what was measured."""
         axis = figure.subplots()
         theory = self.theory
-        labels = {"free_surface_speed": "computed"}
-        draw_columns(axis, run_data.history, labels, "free surface of the last plate [m/s]", "µs")
-        if self.is_pair:
+        words = "window's face" if self.has_window else "free surface of the last plate"
+        labels = {self.observed: "computed"}
+        draw_columns(axis, run_data.history, labels, f"{words} [m/s]", "µs")
+        draw_trace(axis, self.deck.trace, self.deck.source)
+        if self.is_pair and self.are_fluids:
             axis.plot(*theory.make_trace(1e6), "k--", lw=0.8, label="theory, until the release")

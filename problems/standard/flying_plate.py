@@ -28,6 +28,14 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Output, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
+from shockgrid.problems.measured_traces import (
+    ONE_MICROSECOND,
+    MeasuredTrace,
+    Source,
+    compare_trace,
+    draw_trace,
+    interpolate,
+)
 from shockgrid.problems.pictures import make_panels
 from shockgrid.problems.problem import (
     BlockPlan,
@@ -48,7 +56,6 @@ from shockgrid.problems.solids import (
 from shockgrid.problems.standard.elastic_piston import make_law
 
 ONE_MILLIMETRE = 1e-3
-ONE_MICROSECOND = 1e-6
 # of the default deck at 5 µs: places [mm], x = 0 being where the flyer's back began, speeds [m/s]
 PROFILE_SPEEDS = {
     15.0: 7.01,
@@ -104,10 +111,8 @@ class FlyingPlateDeck(SolidDeck, kw_only=True):
     places: key(
         tuple[float, ...], "where it is measured [m]; the flyer's back begins at 0", max_length=40
     ) = tuple(ONE_MILLIMETRE * x for x in PROFILE_SPEEDS)
-    trace: key(
-        tuple[tuple[float, float], ...], "measured times [s] and speeds [m/s] of the target's back"
-    ) = ()
-    source: key(str, "who measured it") = "measured"
+    trace: MeasuredTrace = ()
+    source: Source = "measured"
     limiter: Limiter = DEFAULT_LIMITER
 
 
@@ -221,11 +226,8 @@ class FlyingPlate(Problem):
             found = interpolate(t, history["back_speed"], ONE_MICROSECOND * time)
             label = f"target's back at {time:g} µs [m/s]"
             rows.append(Row(f"back_at_{time:g}", found, theory, label, size=size, source=SOURCE))
-        for time, measured in deck.trace:
-            found = interpolate(t, history["back_speed"], time)
-            label = f"target's back at {time / ONE_MICROSECOND:g} µs [m/s]"
-            name = f"trace_at_{time / ONE_MICROSECOND:g}"
-            rows.append(Row(name, found, measured, label, size=deck.speed, source=deck.source))
+        words = "target's back"
+        rows += compare_trace(history, "back_speed", deck.trace, words, deck.speed, deck.source)
         sizes = f"{1e3 * deck.flyer:g} mm at {deck.speed:g} m/s onto {1e3 * deck.target:g} mm"
         note = f"differences of velocities are parts of {size:g} m/s, that behind the shock"
         if deck.trace:
@@ -259,17 +261,7 @@ class FlyingPlate(Problem):
         history = run_data.history
         right.plot(history["t"] / ONE_MICROSECOND, history["back_speed"], lw=1.4, label="computed")
         right.set(xlabel="t [µs]", ylabel="target's back [m/s]")
-        if deck.trace:
-            times, speeds = np.transpose(deck.trace)
-            right.plot(times / ONE_MICROSECOND, speeds, "k+", ms=8, label=deck.source)
+        draw_trace(right, deck.trace, deck.source)
         if self.is_reference:
             left.plot(list(PROFILE_SPEEDS), list(PROFILE_SPEEDS.values()), "k+", ms=8, label=SOURCE)
             right.plot(list(BACK_SPEEDS), list(BACK_SPEEDS.values()), "k+", ms=8, label=SOURCE)
-
-
-def interpolate(t: np.ndarray, values: np.ndarray, at: float) -> float:
-    """A column of the history at a time; NaN before the run has come so far."""
-    known = np.isfinite(values) & np.isfinite(t)
-    if not known.any() or t[known][-1] < at or t[known][0] > at:
-        return math.nan
-    return float(np.interp(at, t[known], values[known]))

@@ -63,7 +63,7 @@ ROOMS = (
     ("problems.column_groups",),
     ("problems.registry", "problems.grid_march"),
     ("problems.references",),
-    ("problems.initial_states", "problems.solids"),
+    ("problems.initial_states", "problems.measured_traces", "problems.solids"),
     ("problems.interface_instability", "problems.plate_on_wedge", "problems.conical_target",
      "problems.shock_bubble", "problems.riemann", "problems.blocks", "problems.standard",
      "problems.convection"),

@@ -31,6 +31,7 @@ from shockgrid.hydro.eos.materials import (
     find_name,
     make_material,
 )
+from shockgrid.hydro.formulas.geometry import find_centres_of_volume, find_geometry
 from shockgrid.hydro.links import join, slide
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.sources import make_gravity
@@ -445,7 +446,8 @@ class Blocks(Problem):
         nodes = self.grids[table.name]
         material = self.materials[table.name]
         where = f"deck: block {table.name!r}"
-        places = dict(zip("xy", compute_centres(nodes), strict=True))
+        centres = find_centres_of_volume(find_geometry(self.deck.geometry), nodes)
+        places = dict(zip("xy", centres, strict=True))
         rho = material.rho0 if table.rho is None else table.rho
         given = {"rho": rho, "u": table.u, "v": table.v, "p": table.p}.items()
         state = [evaluate(text, places, f"{where}, {name}") for name, text in given]

@@ -20,9 +20,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.jit import inlined
+from shockgrid.regrid.measure.corners import compute_centres
 
 TINY_RADIUS = 1e-300  # avoids 0/0 at faces on the axis
 
@@ -251,6 +254,23 @@ def find_geometry(name: str) -> Geometry:
     if name not in GEOMETRIES:
         raise BadInput(f"there is no geometry {name!r}{suggest(name, GEOMETRIES)}")
     return GEOMETRIES[name]
+
+
+def find_centres_of_volume(geometry: Geometry, nodes):
+    """Centres of volume (2, ni, nj) [m] of the cells between nodes (2, ni + 1, nj + 1).
+
+    What a cell holds of a field is, but for its curvature, the field's value there.  In plane flow
+    the means of the four nodes.
+    """
+    middles = compute_centres(nodes)
+    if not geometry.curved:
+        return middles
+    a = nodes[:, :-1, :-1]
+    b = nodes[:, 1:, :-1]
+    c = nodes[:, 1:, 1:]
+    d = nodes[:, :-1, 1:]
+    mid_i, mid_j, _ = compute_line_geometry(a, b, c, d)
+    return middles + np.array(compute_centre_offset(mid_i, mid_j, (a - b) + (c - d), middles[1]))
 
 
 def compute_volumes(geometry: Geometry, nodes):

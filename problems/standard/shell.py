@@ -21,6 +21,7 @@ import numpy as np
 
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
+from shockgrid.hydro.formulas.geometry import find_centres_of_volume, find_geometry
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem
@@ -120,10 +121,8 @@ class CollapsingShell(RadialProblem):
     def build(self):
         deck = self.deck
         nodes = self.make_grids()["shell"]
-        # the velocity at the cells' centres
-        centres = 0.25 * (
-            nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1]
-        )
+        # the velocity at the cells' centres of volume
+        centres = find_centres_of_volume(find_geometry(self.geometry), nodes)
         radius = np.hypot(*centres)
         inwards = -self.speed * (deck.inner / radius) ** self.shell.power / radius
         u, v = inwards * centres

@@ -19,7 +19,7 @@ def make_interface(**deck):
     return InterfaceInstability(InterfaceDeck(**{"cells": 128, **deck}))
 
 
-def make_bodies(ends="wall", **options):
+def make_bodies(ends="wall", strength=False, **options):
     """Two squares of copper with a gap between them; `ends` are the sides along it."""
     tables = []
     for name, x, inner, outer in (("one", 0.0, "i_max", "i_min"), ("two", 1.1, "i_min", "i_max")):
@@ -36,7 +36,14 @@ def make_bodies(ends="wall", **options):
             BlockSide(side=side, kind=kind, options=options if kind == "free-surface" else {})
             for side, kind in kinds.items()
         ]
-        table = BlockTable(name=name, curves=curves, material="Cu", cells=(4, 4), side=tuple(sides))
+        table = BlockTable(
+            name=name,
+            curves=curves,
+            material="Cu",
+            strength=strength,
+            cells=(4, 4),
+            side=tuple(sides),
+        )
         tables.append(table)
     links = (
         ()
@@ -73,6 +80,7 @@ USUAL = {
     "flyer": lambda: FlyerTarget(FlyerTargetDeck(speed=3e3)),
     "cavity": lambda: Cavity(CavityDeck()),
     "bodies": make_bodies,
+    "friction of solids": lambda: make_bodies(strength=True, friction=0.2),
     "impact at 4 km/s": lambda: Riemann(RiemannDeck(case="al-ss304-4")),
 }
 

@@ -6,6 +6,7 @@ from plates import find_event, make_plate, mean_speed, middle_row, take_plateau
 from wave_diagram import find_impact, find_parting
 
 from builders import check_budget, march_whole
+from oracles.colliding_plates import Plate, find_speeds
 from shockgrid.hydro.eos import IdealGas, StiffenedGas
 from shockgrid.hydro.eos.materials import find_material
 from shockgrid.hydro.rows import P, U
@@ -109,6 +110,55 @@ def test_three_plates(cells, bar):
     for block, wanted in zip(blocks, (left, left, speed - 2.0 * left), strict=True):
         assert mean_speed(block) == pytest.approx(wanted, abs=bar * speed)
     check_budget(rows)
+
+
+def march_plates(plates, t_end):
+    """Plates of the oracle by the flow: their blocks and rows."""
+    blocks = []
+    low = 0.0
+    for number, plate in enumerate(plates):
+        low += plate.gap
+        ends = low, low + plate.thickness
+        blocks.append(make_plate(str(number), plate.material, ends, plate.cells, plate.speed))
+        low = ends[1]
+    return blocks, march_whole(Simulation(blocks, [], t_end=t_end))
+
+
+STACKS = {
+    "pair": (Plate("Cu", 1e-3, 40, 800.0), Plate("Al1100", 1.5e-3, 40, gap=2e-5)),
+    "three": (
+        Plate("Pb", 0.6e-3, 60, 700.0),
+        Plate("SS304", 0.5e-3, 60, gap=2e-5),
+        Plate("Ti", 0.8e-3, 60, gap=5e-5),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ["pair", pytest.param("three", marks=pytest.mark.slow)])
+def test_stacks_of_plates(name):
+    """Mean speeds of all plates beside those of a Lagrangian code: 1 % of the first one's."""
+    plates = STACKS[name]
+    t_end = 8e-7
+    blocks, rows = march_plates(plates, t_end)
+    speeds, made, opened = find_speeds(plates, t_end)
+    assert (rows[-1]["contacts_made"], rows[-1]["contacts_opened"]) == (made, opened)
+    for block, speed in zip(blocks, speeds, strict=True):
+        assert mean_speed(block) == pytest.approx(speed, abs=1e-2 * plates[0].speed)
+    check_budget(rows)
+
+
+@pytest.mark.parametrize("cells", [40, 160, 320])
+def test_a_thin_foil_bounces(cells):
+    """Off a thick target with any cells, once, as by characteristics: .5 % of its first speed."""
+    speed = 1000.0
+    thickness = 2.5e-5
+    parting = find_parting(take("Al1100"), take("Cu"), speed, thickness)
+    gap = 2e-6
+    foil = Plate("Al1100", thickness, 40, speed)
+    t_end = gap / speed + 1.3 * parting.time
+    blocks, rows = march_plates((foil, Plate("Cu", 2e-3, cells, gap=gap)), t_end)
+    assert rows[-1]["contacts_made"] == 1 and rows[-1]["contacts_opened"] == 1
+    assert mean_speed(blocks[0]) == pytest.approx(parting.flyer_speed, abs=5e-3 * speed)
 
 
 def make_touching(speeds, p=0.0):

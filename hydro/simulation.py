@@ -39,6 +39,8 @@ LEAST_STEP_PART = 1e-9  # of the first stable step: a shorter one will not bring
 # the same where the flow can go on without the line that makes the steps short
 LEAST_STEP_PART_BEFORE_HANDOVER = 0.02
 COLLAPSING_STEP_PART = 1e-4  # the same: so short steps show that a grid cannot follow
+# why two blocks became one, in the history: at a given time; else the cause of a failure
+AT_ITS_TIME = "time"
 SMALL_CELLS = 0.05  # part of a block's cells that may be too small for a step
 # that a state has before its first step
 START_COLUMNS = ("total_", "surface_", "least", "worst", "cells")
@@ -149,6 +151,7 @@ class Simulation:
         self.handover = handover
         self.refining = refining
         self._counts_cells = refining is not None
+        self._handed_over = ""  # why, in the row of the step in which it was
         self._connect(blocks, links, make_regridder)
         check_overlaps(blocks, links)
         if self.meetings.set_in_contact():
@@ -326,7 +329,9 @@ class Simulation:
             self._refine(self.refining)
         elif self.handover is not None and self.handover.is_due(clock.t):
             self.hand_over()
+            self._handed_over = AT_ITS_TIME
         row = self.compute_row(record.limit, record.retries)
+        self._handed_over = ""
         self._note_end()  # within the step: every rank has what it reads
         ranks.end_step()
         return row
@@ -395,6 +400,9 @@ class Simulation:
         self.motion.counts = kept["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
+        # what the old cells and the line had asked of the step
+        self.clock.retry_dt = np.inf
+        self.clock.stretch_rate = 0.0
 
     def _hand_over_after(self, failure: RunFailure) -> None:
         """Lay both materials on one grid where the flow ends with their line, or say why not."""
@@ -403,6 +411,7 @@ class Simulation:
             self.hand_over()
         except (BadInput, RunFailure):
             raise failure from None
+        self._handed_over = failure.cause or "failure"
 
     def _join_blocks(
         self, blocks: list[Block], links: list, make_regridder: Callable[[], object]
@@ -482,6 +491,8 @@ class Simulation:
             "retries": retries,
             **compute_columns(self._flow),
         }
+        if self.handover is not None:
+            row["handover"] = self._handed_over
         if self._counts_cells:
             row["cells"] = sum(block.ni * block.nj for block in self._blocks)
         return row

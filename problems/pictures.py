@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shockgrid.problems.prefixes import pick_prefix
+from shockgrid.regrid.measure.corners import compute_centres
 
 
 def name_axis(words: str, unit: str) -> str:
@@ -16,6 +17,7 @@ def name_axis(words: str, unit: str) -> str:
     return words if unit in ("", "1") else f"{words} [{unit}]"
 
 
+CONTACT_FRACTION = 0.5  # volume fraction at a contact between two materials in one block
 MOST_RATES = 200  # intervals of a run in which rates are drawn
 UNITS = {"s": 1.0, "1": 1.0, "ms": 1e3, "µs": 1e6}  # of a time axis, in a second
 
@@ -90,6 +92,21 @@ def draw_lines(axis, lines: Iterable[np.ndarray]) -> None:
     """White polylines (2, n) over a field, in the units of its axes."""
     for line in lines:
         axis.plot(*line, color="w", lw=0.8)
+
+
+def trace_contact(block) -> list[np.ndarray]:
+    """Curves (2, n) [m] on which the volume fraction of a dumped block is a half.
+
+    None where its cells have no such fraction, or lie in a single row.
+    """
+    fraction = block.cell_fields.get("volume_fraction")
+    if fraction is None or min(fraction.shape) < 2:
+        return []
+    from contourpy import contour_generator  # with matplotlib: slow to load
+
+    centres = compute_centres(block.nodes)
+    found = contour_generator(*centres, fraction).lines(CONTACT_FRACTION)
+    return [np.asarray(curve).T for curve in found]
 
 
 def title_time(dump) -> str:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.carried.fields import CarriedField
-from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture
+from shockgrid.hydro.eos.mixture import MASS_FRACTION, SEEN_FIELDS, VOLUME_FRACTION, Mixture
 from shockgrid.hydro.formulas.reconstruction import FIRST_ORDER_LIMITER
 from shockgrid.hydro.mixture.sides import make_gather, make_trace_sides, place_layers
 from shockgrid.hydro.mixture.slopes import (
+    AT_CENTRE,
     MARK_ROWS,
     MIXED_QUANTITIES,
     SLOPE_PARTS,
@@ -21,6 +22,7 @@ from shockgrid.hydro.mixture.slopes import (
     make_fill_slopes,
 )
 from shockgrid.hydro.mixture.update import FLUX_PARTS, make_mixed_update
+from shockgrid.hydro.rows import RHO, P, U, V
 from shockgrid.regrid.errors import BadInput
 
 LONG_NAMES = {
@@ -72,15 +74,22 @@ class MixedCells:
     def predict(self, block: Any, half_dt: float) -> None:
         """Phase 2, after the couplings: slopes and values at mid-time."""
         place_layers(self._list_start(block), self.lengths, block.rim.rows)
-        self._fill_slopes(block, half_dt, block.kernels.is_first_order)
-
-    def _fill_slopes(self, block: Any, half_dt: float, is_first_order: bool) -> None:
-        limiter = FIRST_ORDER_LIMITER if is_first_order else self.limiter
+        limiter = FIRST_ORDER_LIMITER if block.kernels.is_first_order else self.limiter
         fill_slopes = make_fill_slopes(self.eos_class, limiter, self.flux)
         fill_slopes(
             self._list_start(block), block.nodes, self.lengths, half_dt, block.parameters,
             self._find_rows(block), self.found,
         )  # fmt: skip
+
+    def _fill_without_slopes(self, block: Any) -> None:
+        """The cells' own values for traces; a step of no length moves nothing by them."""
+        state, carried = (array[:, 1:-1, 1:-1] for array in self._list_start(block))
+        slopes, marks = self.found
+        slopes[...] = 0.0
+        marks[...] = 0.0
+        first = state[RHO] * carried[MASS_FRACTION]
+        values = first, state[RHO] - first, state[U], state[V], state[P], carried[VOLUME_FRACTION]
+        slopes[:, AT_CENTRE] = values
 
     def trace(self, block: Any, dt: float) -> None:
         """Phase 6: traces on the moved faces, fluxes of walls and open sides."""
@@ -94,8 +103,7 @@ class MixedCells:
     def update(self, block: Any, dt: float) -> None:
         """Phase 6, after the couplings' fluxes: the new state and its totals."""
         if dt == 0.0:  # rates and totals alone, before anything is known of the sides
-            fill_lengths(block.nodes, self.lengths)
-            self._fill_slopes(block, 0.0, is_first_order=True)
+            self._fill_without_slopes(block)
         update_mixed = make_mixed_update(self.eos_class, self.limiter)
         block.totals.start_update()
         update_mixed(

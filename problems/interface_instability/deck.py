@@ -112,6 +112,13 @@ class InterfaceDeck(SolidDeck, kw_only=True):
     handover_kct: key(
         float | None, "k c t from which on both materials are on one grid", ge=-1e4, le=1e4
     ) = None
+    handover_refinement: key(
+        int | None,
+        "how much finer the grid of both materials is where the line was. If left out: 2, and 1 "
+        "for start captured",
+        ge=1,
+        le=16,
+    ) = None
     layer: key(
         float | None,
         "start crossed: cells to the nearer wave. If left out: those of 3/16 of the shortest "

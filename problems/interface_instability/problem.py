@@ -56,6 +56,7 @@ from shockgrid.problems.interface_instability.zone import (
     ZONE_UNITS,
     make_zone_nodes,
     measure_contact,
+    measure_line,
     measure_zone,
 )
 from shockgrid.problems.problem import BlockPlan, Problem
@@ -85,6 +86,8 @@ CLEAR_LAYER_CELLS = 8.0  # that keep a captured front clear of the interface
 COARSE_LAYER_PART = 0.25  # of a wave of few cells, up to CLEAR_LAYER_CELLS
 # diffusion thicknesses of a layer to the shock and the far sides: nothing of it is as far away
 CLEAR_THICKNESSES = 2.0
+# a field needs finer cells than a line where it is to go on as fast
+HANDOVER_REFINEMENT = 2
 FAR_FIELD_PART = 0.25  # part of each block, counted from its far side, that is called the far field
 
 
@@ -237,7 +240,15 @@ class InterfaceInstability(Results, Problem):
         first, second = blocks
         sides = first.nodes[:, 0, :], second.nodes[:, -1, :]
         line = first.nodes[:, -1, :]
-        return make_zone_nodes(Spacing(self.deck), sides, line, self.make_heights())
+        return make_zone_nodes(self.deck, sides, line, self.zone_refinement)
+
+    @property
+    def zone_refinement(self) -> int:
+        """Cells of the grid of both materials along each direction, for one beside the line."""
+        given = self.deck.handover_refinement
+        if given is None:
+            return 1 if self.is_captured else HANDOVER_REFINEMENT
+        return given
 
     def _assemble_zone(self, nodes: np.ndarray, held: dict) -> tuple:
         """The block of both materials, its links, and what makes its regridder."""
@@ -713,7 +724,7 @@ class InterfaceInstability(Results, Problem):
         far = {"far_transverse_speed": max(map(measure_far_speed, evolution.blocks))}
         if first.name == ZONE_BLOCK:
             contact = measure_contact(first, self.k, self.followed)
-            return contact | far | measure_zone(first)
+            return contact | far | measure_zone(first, self.make_heights())
         line = first.nodes[:, -1, :]
         mean, most, least, roughness, turn = measure_shape(
             line, self.k, self._numbers, self.deck.sides == "wall"
@@ -727,7 +738,7 @@ class InterfaceInstability(Results, Problem):
             "roughness": roughness,
             "largest_turn": math.degrees(turn),
             **far,
-            **(dict.fromkeys(ZONE_UNITS, 0.0) if self.may_hand_over else {}),
+            **(measure_line(evolution.blocks, self.make_heights()) if self.may_hand_over else {}),
         }
 
     def cautions(self, history=None) -> list[str]:

@@ -29,6 +29,8 @@ from shockgrid.problems.pictures import (
 from shockgrid.problems.problem import Report, Row, fit_slope
 from shockgrid.regrid.measure.corners import compute_centres
 
+# times the height of the domain, beyond which panels of the interface lie one above the other
+FLAT_ZONE_HEIGHTS = 3.0
 SHOWN_TIMES = 3  # times drawn beside the growth
 MOST_CURVES = 6  # modes that a screen and a picture of growth show one by one, the strongest
 FIRST_DRAWN_KCT = 1.0  # k c t from which on computed rates are drawn
@@ -44,6 +46,34 @@ def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     column = {name: np.asarray(history[name], dtype=float) for name in names if name in history}
     known = np.isfinite(column["amplitude"]) & np.isfinite(column["t"])
     return {name: values[known] for name, values in column.items()}
+
+
+def _describe_handover(problem, history: Mapping[str, np.ndarray]) -> list[str]:
+    """From when on both materials are on one grid, and what was measured before and after."""
+    mixed = np.flatnonzero(np.asarray(history.get("mixed_mass", ())) > 0.0)
+    if not mixed.size or mixed[0] == 0:
+        return []
+    row = int(mixed[0])
+    kct = float(get_kct(problem, history["t"][row]))
+    measured = []
+    for name in ("amplitude", "integral_width", "circulation"):
+        before, after = (float(history[name][at]) for at in (row - 1, row))
+        change = f" ({100.0 * (after / before - 1.0):+.2f} %)" if before else ""
+        measured.append(f"{name.replace('_', ' ')} {before:.4g} -> {after:.4g}{change}")
+    return [f"both materials on one grid from k c t = {kct:.3g} on: {', '.join(measured)}"]
+
+
+def _describe_ends(problem) -> list[str]:
+    """When waves are back from the ends of a tube that a run is to go on in."""
+    if problem.deck.lengths is None or not problem.may_hand_over:
+        return []
+    ends = {"first": "the piston's end", "second": "the end wall"}
+    returned = [
+        f"from {ends[name]} at k c t = {float(get_kct(problem, t)):.3g}"
+        for name, t in problem.find_echoes().items()
+        if t < problem.t_end
+    ]
+    return [f"waves come back {' and '.join(returned)}; no theory goes on"] if returned else []
 
 
 def _predict(problem) -> list[Row]:
@@ -256,6 +286,23 @@ def _draw_rates(problem, axes, t, curves: list[_Curve]) -> None:
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
+def find_reach(drawn: Sequence[Sequence[np.ndarray]], margin: float) -> float:
+    """Half of the width [m] that panels of the interface need, all of them alike.
+
+    drawn: curves (2, n) of the interface at each time.
+    """
+    lines = [np.concatenate(curves, axis=1) for curves in drawn]
+    return max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
+
+
+def _mark_handover(axes, problem, history: Mapping[str, np.ndarray], kct: np.ndarray) -> None:
+    """A line where both materials come onto one grid."""
+    mixed = np.flatnonzero(np.asarray(history.get("mixed_mass", ())) > 0.0)
+    if mixed.size and mixed[0] > 0:
+        at = float(get_kct(problem, history["t"][mixed[0]]))
+        axes.axvline(at, color="C3", lw=0.8, label="one grid for both")
+
+
 class Results:
     """What the problem says of a run, a part of its class: its report and its pictures."""
 
@@ -289,6 +336,8 @@ class Results:
         notes = ["growth: there is no theory for two shocks"]
         if deck.second_shock is None:
             rows, notes = _compare(self, column, kct)
+        notes += _describe_ends(self)
+        notes += _describe_handover(self, history)
         far = column["far_transverse_speed"].max() / theory.sound_speed
         notes.append(
             f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
@@ -306,9 +355,18 @@ class Results:
 
     def draw_growth(self, figure, run) -> None:
         """Amplitude and growth rate against theory, and the interface with its grid at the end."""
-        grid = figure.add_gridspec(2, SHOWN_TIMES, height_ratios=(1.0, 1.1))
-        amplitude = figure.add_subplot(grid[0, 0])
-        rate = figure.add_subplot(grid[0, 1:])
+        drawn = self._find_drawn_lines(run)
+        reach = find_reach([lines for _, lines in drawn], 0.05 * self.deck.wavelength)
+        # panels of a zone that is longer than high lie one above the other
+        height = self.deck.width * self.deck.wavelength
+        flat = 2.0 * reach > FLAT_ZONE_HEIGHTS * height
+        count = max(1, len(drawn)) if flat else 1
+        ratios = [1.0] + [0.45] * count if flat else [1.0, 1.1]
+        figure.set_size_inches(10.0, 4.0 + 1.4 * count if flat else 6.0)
+        grid = figure.add_gridspec(1 + count, 2 * SHOWN_TIMES, height_ratios=ratios)
+        narrow = SHOWN_TIMES if flat else 2
+        amplitude = figure.add_subplot(grid[0, :narrow])
+        rate = figure.add_subplot(grid[0, narrow:])
         column = _columns(self, run.history)
         kct = get_kct(self, column["t"])
         several = len(self.harmonics) > 1
@@ -323,31 +381,39 @@ class Results:
         time_label = "k c t after the shock's arrival" + ", k of mode 1" * several
         amplitude.set(xlabel=time_label, ylabel="a / a0")
         rate.set(xlabel=time_label, ylabel="(da/dt) / (k a0)")
+        for axes in (amplitude, rate):
+            _mark_handover(axes, self, run.history, kct)
+        if drawn:
+            places = [(1 + n, slice(None)) for n in range(len(drawn))]
+            if not flat:
+                places = [(1, slice(2 * n, 2 * n + 2)) for n in range(len(drawn))]
+            panels = [figure.add_subplot(grid[place]) for place in places]
+            self._draw_zone(figure, panels, drawn, reach)
+
+    def _find_drawn_lines(self, run) -> list[tuple]:
+        """Dumps over the run, and in each the curves (2, n) of the interface."""
+        return [(dump, find_lines(dump.blocks)) for dump in choose_even_dumps(run, SHOWN_TIMES)]
+
+    def _draw_zone(self, figure, panels, drawn, reach: float) -> None:
+        """Density and grid around the interface, in a panel each, all as wide as 2 `reach` [m]."""
         windows = []
         shown = []
-        dumps = choose_even_dumps(run, SHOWN_TIMES)
-        margin = 0.05 * self.deck.wavelength
-        drawn = [find_lines(dump.blocks) for dump in dumps]
-        lines = [np.concatenate(curves, axis=1) for curves in drawn]
-        # all panels are as wide as the widest needs
-        reach = max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
-        for dump, (x, _) in zip(dumps, lines, strict=True):
+        for dump, curves in drawn:
+            x = np.concatenate(curves, axis=1)[0]
             middle = 0.5 * (x.min() + x.max())
             windows.append((middle - reach, middle + reach))
             for block in dump.blocks:
                 inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
                 shown.append(block.cell_fields["rho"][inside])
-        rho = np.concatenate(shown) if shown else np.empty(0)
-        panels = [figure.add_subplot(grid[1, column]) for column in range(len(dumps))]
-        for axes, dump, curves, window in zip(panels, dumps, drawn, windows, strict=True):
+        rho = np.concatenate(shown)
+        for axes, (dump, curves), window in zip(panels, drawn, windows, strict=True):
             title = f"density and grid, {self.scale_time(dump.t)}"
             colours = Colours(low=rho.min(), high=rho.max())
             picture = draw_field(axes, dump, "rho", colours, every=1, title=title)
             draw_lines(axes, curves)
             axes.set_xlim(*window)
-        if panels:
-            label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")
-            figure.colorbar(picture, ax=panels, label=label)
+        label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")
+        figure.colorbar(picture, ax=panels, label=label)
 
     def draw_spectrum(self, figure, run) -> None:
         """k a of each mode by its number at some times, and the line at these times.

@@ -44,10 +44,14 @@ def grow_steps(steps: list[float], stretch: float, length: float) -> list[float]
 
 @dataclass(frozen=True)
 class Spacing:
-    """The deck's cells across the interface, `finer` times as fine at the interface."""
+    """The deck's cells across the interface, `finer` times as fine at the interface.
+
+    fine_zone: wavelengths on each side with the finest cells.
+    """
 
     deck: InterfaceDeck
     finer: float = 1.0
+    fine_zone: float = FINE_ZONE_WAVELENGTHS
 
     def make(self, length: float) -> np.ndarray:
         """Distances (n,) [m] of the nodes from the interface, from 0 to `length`."""
@@ -73,7 +77,7 @@ class Spacing:
         part = np.arange(1, count) / count
         growing = first * self.finer ** (part * part * (3.0 - 2.0 * part))
         steps = np.append(
-            np.full(round(FINE_ZONE_WAVELENGTHS * self.deck.wavelength / first), first), growing
+            np.full(round(self.fine_zone * self.deck.wavelength / first), first), growing
         )
         return steps[np.cumsum(steps) <= length]
 

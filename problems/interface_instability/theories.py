@@ -376,7 +376,10 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
         )
     single = deck.second_shock is None
     tension = deck.line.tension
-    if single:  # waves that are back from the far ends before the run's end
+    # waves that are back from the far ends before the run's end; where a run is to go on after its
+    # line, the ends that it was given are those of a tube
+    is_tube = problem.may_hand_over and deck.lengths is not None
+    if single and not is_tube:
         cautions += [
             f"waves return to the interface from the far end of the {name} material at t = "
             f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}: later growth is not that of an "
@@ -451,12 +454,13 @@ def _caution_steep_line(problem, history) -> list[str]:
             f"the first line has k a0 = {slope:.3g}, {slope / (2.0 * math.pi):.2g} wavelengths; "
             f"lines beyond {MOST_COMPARED_KA:g} were never compared with theory or experiment"
         )
+    refining = "" if problem.may_hand_over else " or refine = true"
     most = 0.0 if history is None else problem.k * float(np.nanmax(history["amplitude"]))
     if most > ROLLED_UP_KA and deck.cells < LEAST_MUSHROOM_CELLS and not deck.refine:
         cautions.append(
             f"the wave has grown to k a = {most:.3g} on {deck.cells} cells per wavelength, "
             f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
-            f"cells = {2 * LEAST_MUSHROOM_CELLS} or refine = true"
+            f"cells = {2 * LEAST_MUSHROOM_CELLS}{refining}"
         )
     turns = [] if history is None else history.get("largest_turn", [])
     turns = np.asarray(turns, dtype=float)
@@ -468,7 +472,8 @@ def _caution_steep_line(problem, history) -> list[str]:
             cautions.append(
                 f"the line turns by up to {turn:.0f} degrees from one segment to the next: it is a "
                 "polygon where it rolls up, and what it looks like there depends on its nodes; "
-                "take more cells, refine = true, or a greater line.thickness"
+                f"take more cells{', refine = true' if refining else ''}, or a greater "
+                "line.thickness"
             )
     return cautions
 

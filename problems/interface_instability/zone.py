@@ -14,29 +14,37 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.eos.mixture import MASS_FRACTION, VOLUME_FRACTION
-from shockgrid.hydro.rows import RHO
-from shockgrid.problems.interface_instability.spacing import Spacing
+from shockgrid.hydro.rows import RHO, U
+from shockgrid.problems.interface_instability.deck import InterfaceDeck
+from shockgrid.problems.interface_instability.spacing import FINE_ZONE_WAVELENGTHS, Spacing
+from shockgrid.problems.pictures import CONTACT_FRACTION, trace_contact
+from shockgrid.regrid.jit import kernel
 
+ZONE_MARGIN = 0.5  # of the line's extent, on either side, with the finest cells
 ZONE_BLOCK = "both"  # name of the block of both materials
-CONTACT_FRACTION = 0.5  # volume fraction at the contact
 SMEARED_CELLS = 3  # on either side of a contact, beyond which cells hold one material
 LEAST_WHOLE_CONTRAST = 0.95  # of the fractions there, where no other contact is near
-ZONE_UNITS = {"integral_width": "m", "mixed_mass": "kg/m"}
+ZONE_UNITS = {"integral_width": "m", "circulation": "m2/s", "mixed_mass": "kg/m"}
 
 
 def make_zone_nodes(
-    spacing: Spacing, sides: tuple[np.ndarray, np.ndarray], line: np.ndarray, heights: np.ndarray
+    deck: InterfaceDeck, sides: tuple[np.ndarray, np.ndarray], line: np.ndarray, finer: int
 ) -> np.ndarray:
     """Nodes (2, ni + 1, nj + 1) [m] of a block from side to side, even where the line (2, n) lies.
 
-    sides: nodes (2, nj + 1) of both far sides, which need not be straight; heights (nj + 1,): of
-    the rows of nodes.
+    sides: nodes (2, n) of both far sides, which need not be straight; finer: cells there, and
+    within ZONE_MARGIN times the extent of the line, for one of the deck's in each direction.
     """
+    parts = np.arange(finer * (sides[0].shape[1] - 1) + 1) / finer
+    sides = divide_curve(sides[0], parts), divide_curve(sides[1], parts)
+    heights = np.linspace(sides[0][1, 0], sides[0][1, -1], parts.size)
     low = float(sides[0][0].mean())
     high = float(sides[1][0].mean())
     zone_low = float(line[0].min())
     zone_high = float(line[0].max())
-    size = spacing.deck.wavelength / spacing.deck.cells
+    size = deck.wavelength / deck.cells / finer
+    margin = max(FINE_ZONE_WAVELENGTHS, ZONE_MARGIN * (zone_high - zone_low) / deck.wavelength)
+    spacing = Spacing(deck, float(finer), margin)
     before = zone_low - spacing.make(zone_low - low)[::-1]
     after = zone_high + spacing.make(high - zone_high)
     count = max(1, round((zone_high - zone_low) / size))
@@ -54,6 +62,12 @@ def make_zone_nodes(
     nodes[:, 0] = sides[0]
     nodes[:, -1] = sides[1]
     return nodes
+
+
+def divide_curve(curve: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Points (2, m) on a curve of straight pieces (2, n), at places in numbers of its pieces."""
+    numbers = np.arange(curve.shape[1])
+    return np.array([np.interp(places, numbers, row) for row in curve])
 
 
 def find_contact_places(block: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -83,6 +97,21 @@ def find_contact_places(block: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return edges[0] + held[-1], np.where(contrast > LEAST_WHOLE_CONTRAST, places, between), j
 
 
+def find_peak(values: np.ndarray, spread: float = 0.0) -> float:
+    """The greatest of values (n,) along a mirrored line, between three of them on a parabola.
+
+    spread: 1/12 where the values are means over their intervals, 0 where they are in the middle.
+    """
+    top = int(values.argmax())
+    before = values[max(top - 1, 0)]
+    after = values[min(top + 1, values.size - 1)]
+    bend = 0.5 * (before + after) - values[top]
+    slope = 0.5 * (after - before)
+    if not (np.isfinite(bend) and bend < 0.0):
+        return float(values[top])
+    return float(values[top] - bend * spread - slope * slope / (4.0 * bend))
+
+
 def find_tip(places: np.ndarray, rows: np.ndarray, count: int, sign: float) -> float:
     """The greatest of places (n,) [m] in `count` rows, or with sign = -1 the least.
 
@@ -91,14 +120,7 @@ def find_tip(places: np.ndarray, rows: np.ndarray, count: int, sign: float) -> f
     """
     reach = np.full(count, -np.inf)
     np.maximum.at(reach, rows, sign * places)
-    top = int(reach.argmax())
-    before = reach[max(top - 1, 0)]
-    after = reach[min(top + 1, count - 1)]
-    bend = 0.5 * (before + after) - reach[top]
-    slope = 0.5 * (after - before)
-    if not (np.isfinite(bend) and bend < 0.0):
-        return sign * float(reach[top])
-    return sign * float(reach[top] - bend / 12.0 - slope * slope / (4.0 * bend))
+    return sign * find_peak(reach, spread=1.0 / 12.0)
 
 
 def measure_row_mode(
@@ -114,8 +136,78 @@ def measure_row_mode(
     return float(2.0 * ((lengths - mean) * wave * rows / flattening).sum() / rows.sum())
 
 
-def measure_zone(block: Any) -> dict[str, float]:
-    """Integral width [m] of the mixing zone, and mass [kg/m] of what is mixed.
+def make_line_profile(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places x (n,) [m], in order, and how much of the height the first material has there (n,).
+
+    Of a line (2, n) [m] from the low end to the high one, the first material before it.  Between
+    the places the profile is straight, as the line is between its nodes; a fold counts as often
+    as it is passed.
+    """
+    x, y = line
+    places = np.sort(x)
+    low = np.minimum(x[1:], x[:-1])
+    high = np.maximum(x[1:], x[:-1])
+    rises = np.diff(y)
+    # of each piece of the line, the part beyond each place
+    reach = np.maximum(high - low, np.finfo(float).tiny)
+    beyond = np.clip((high[:, None] - places[None, :]) / reach[:, None], 0.0, 1.0)
+    return places, rises @ beyond / (y[-1] - y[0])
+
+
+def measure_line_width(line: np.ndarray) -> float:
+    """Integral width [m] of a line (2, n): that of `measure_zone`, exactly."""
+    places, profile = make_line_profile(line)
+    before, after = profile[:-1], profile[1:]
+    mean = 0.5 * (before + after)
+    # of a straight piece of the profile, the mean of its square is that much above mean * mean
+    spread = (after - before) ** 2 / 12.0
+    return float((4.0 * (mean * (1.0 - mean) - spread) * np.diff(places)).sum())
+
+
+@kernel(allocates=False)
+def add_to_rows(nodes, amounts, heights, rows):
+    """Add amounts (ni, nj) of cells to rows (n,) between heights (n + 1,), by what lies in each.
+
+    A cell counts as even between the mean of its two lower corners and that of the two upper ones.
+    """
+    for i in range(amounts.shape[0]):
+        for j in range(amounts.shape[1]):
+            a = nodes[1, i, j]
+            b = nodes[1, i, j + 1]
+            c = nodes[1, i + 1, j]
+            d = nodes[1, i + 1, j + 1]
+            # the corners in order, as far as it matters
+            a, b = min(a, b), max(a, b)
+            c, d = min(c, d), max(c, d)
+            a, c = min(a, c), max(a, c)
+            b, d = min(b, d), max(b, d)
+            low = 0.5 * (a + min(b, c))
+            high = 0.5 * (d + max(b, c))
+            density = amounts[i, j] / (high - low)
+            for row in range(rows.shape[0]):
+                shared = min(high, heights[row + 1]) - max(low, heights[row])
+                if shared > 0.0:
+                    rows[row] += density * shared
+
+
+def measure_circulation(blocks: Any, heights: np.ndarray) -> float:
+    """The greatest circulation [m2/s] around rows from far side to far side.
+
+    blocks: one, or several side by side along i; heights (n + 1,): between the rows.  Two lines
+    along x, joined at both far sides, where nothing moves along them, go around all vortices in
+    between; the two are chosen between which these turn the most one way.
+    """
+    flow = np.zeros(heights.size - 1)
+    for block in blocks:
+        add_to_rows(block.nodes, block.volume * block.state[U, 1:-1, 1:-1], heights, flow)
+    along = flow / np.diff(heights)
+    return find_peak(along, 1.0 / 12.0) + find_peak(-along, 1.0 / 12.0)
+
+
+def measure_zone(block: Any, heights: np.ndarray) -> dict[str, float]:
+    """Integral width [m] of the mixing zone, circulation, and mass [kg/m] of what is mixed.
+
+    heights (n + 1,) [m]: between rows, for the circulation.
 
     The integral over x of 4 z (1 - z) with z the mean volume fraction at each x; and of
     4 y (1 - y), y the mass fraction, over the mass.
@@ -126,9 +218,22 @@ def measure_zone(block: Any) -> dict[str, float]:
     mass = volume * block.state[RHO, 1:-1, 1:-1]
     profile = (volume * fraction).sum(axis=1) / volume.sum(axis=1)
     widths = volume.sum(axis=1) / np.ptp(block.nodes[1, 0])
+    # between its means the profile is straight: of its square, the mean over a cell is larger
+    steps = np.diff(profile, prepend=profile[0], append=profile[-1])
+    spread = (0.5 * (steps[1:] + steps[:-1])) ** 2 / 12.0
     return {
-        "integral_width": float((4.0 * profile * (1.0 - profile) * widths).sum()),
+        "integral_width": float((4.0 * (profile * (1.0 - profile) - spread) * widths).sum()),
+        "circulation": measure_circulation([block], heights),
         "mixed_mass": float((4.0 * part * (1.0 - part) * mass).sum()),
+    }
+
+
+def measure_line(blocks: Any, heights: np.ndarray) -> dict[str, float]:
+    """What `measure_zone` measures, of a line between two blocks, where nothing is mixed."""
+    return {
+        "integral_width": measure_line_width(blocks[0].nodes[:, -1, :]),
+        "circulation": measure_circulation(blocks, heights),
+        "mixed_mass": 0.0,
     }
 
 
@@ -153,21 +258,6 @@ def measure_contact(block: Any, wavenumber: float, followed: Any) -> dict[str, f
         "roughness": math.nan,
         "largest_turn": math.nan,
     }
-
-
-def trace_contact(block: Any) -> list[np.ndarray]:
-    """Curves (2, n) [m] on which the volume fraction of a dumped block is a half."""
-    from contourpy import contour_generator  # with matplotlib: slow to load
-
-    x, y = block.nodes
-    centres = [
-        0.25 * (nodes[1:, 1:] + nodes[:-1, 1:] + nodes[1:, :-1] + nodes[:-1, :-1])
-        for nodes in (x, y)
-    ]
-    found = contour_generator(*centres, block.cell_fields["volume_fraction"]).lines(
-        CONTACT_FRACTION
-    )
-    return [np.asarray(curve).T for curve in found]
 
 
 def find_lines(blocks: Any) -> list[np.ndarray]:

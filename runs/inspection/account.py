@@ -42,6 +42,7 @@ def describe_run(history: History, cells: int, blocks: Sequence[str] = ()) -> li
         ("regridding: ", describe_regridding(history)),
         ("", describe_convexity(history)),
         ("contacts: ", describe_contacts(history)),
+        ("one grid for two materials: ", describe_handover(history)),
         ("largest conservation errors: ", ", ".join(drifts)),
         ("speed: ", describe_speed(history, cells)),
     )
@@ -56,6 +57,20 @@ def describe_limits(history: History) -> str:
     names, counts = np.unique(limits[limits != ""], return_counts=True)
     shares = [describe_share(often) for often in counts / counts.sum()]
     return ", ".join(f"{names[k]} {shares[k]}" for k in np.argsort(-counts))
+
+
+def describe_handover(history: History) -> str:
+    """From when on two blocks have been one, and why."""
+    reasons = history.get("handover", NONE)
+    if reasons.dtype.kind != "U":
+        return ""
+    rows = np.flatnonzero(reasons != "")
+    if not rows.size:
+        return ""
+    row = int(rows[0])
+    reason = str(reasons[row]).replace("-", " ")
+    why = "as the deck says" if reason == "time" else f"the lines could not go on: {reason}"
+    return f"from step {history['step'][row]}, t = {history['t'][row]:.4g}, on; {why}"
 
 
 def describe_fastest(history: History, blocks: Sequence[str]) -> str:

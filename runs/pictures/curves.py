@@ -271,7 +271,8 @@ def write_csv(
 
 
 CONSTANT_VARIATION = 1e-9  # relative variation of what is called constant
-PLAIN = ("step", "t", "dt", "dt_limit", "finished", "fastest_block", "fastest_i", "fastest_j")
+PLAIN = ("step", "t", "dt", "dt_limit", "finished", "handover",
+         "fastest_block", "fastest_i", "fastest_j")  # fmt: skip
 GRID = ("least_scaled_jacobian", "worst_aspect", "cells_not_convex")
 SHARED_PANEL_FACTOR = 30.0  # columns in one panel are of one size within this factor
 MOST_PANEL_COLUMNS = 4  # of them

@@ -16,7 +16,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize, PowerNorm
 
 from shockgrid.problems.evolution import get_material
-from shockgrid.problems.pictures import name_axis
+from shockgrid.problems.pictures import name_axis, trace_contact
 from shockgrid.problems.prefixes import pick_prefix
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.measure.corners import compute_centres
@@ -60,8 +60,9 @@ def trace_outline(blocks: Sequence) -> Outline:
 
 
 def find_interfaces(blocks: Sequence) -> list[np.ndarray]:
-    """The interfaces as polylines (2, n)."""
-    return [line for _, line in trace_outline(blocks)[0]]
+    """The interfaces as polylines (2, n), those inside blocks of two materials among them."""
+    inside = [curve for block in blocks for curve in block.contacts]
+    return [line for _, line in trace_outline(blocks)[0]] + inside
 
 
 def _edges_on(line: np.ndarray, nodes: np.ndarray, reach: float) -> np.ndarray:
@@ -216,6 +217,7 @@ class Sheet:
     material: str
     name: str
     fields: dict[str, np.ndarray]
+    contacts: Sequence[np.ndarray] = ()  # curves (2, n) between two materials in its cells
 
 
 def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
@@ -241,17 +243,26 @@ def make_sheets(dump: Dump, names: Sequence[str], view: View) -> list[Sheet]:
             )
         found = {name: find_field(block, name) for name in names}
         fields = {name: field.compute(block) for name, field in found.items() if field}
-        sheets.append(Sheet(block.nodes, block.material, block.name, fields))
+        contacts = trace_contact(block)
+        sheets.append(Sheet(block.nodes, block.material, block.name, fields, contacts))
     if view.mirror:
         axis = "xy".index(view.mirror)
         centre = min(sheet.nodes[axis].min() for sheet in sheets)
         for sheet in list(sheets):
-            nodes = sheet.nodes.copy()
-            nodes[axis] = 2 * centre - nodes[axis]
+            nodes = _mirror(sheet.nodes, axis, centre)
             signs = {name: -1.0 if name in FLIPPED[view.mirror] else 1.0 for name in sheet.fields}
             fields = {name: signs[name] * values for name, values in sheet.fields.items()}
-            sheets.append(Sheet(nodes, sheet.material, sheet.name + " mirrored", fields))
+            contacts = [_mirror(curve, axis, centre) for curve in sheet.contacts]
+            name = sheet.name + " mirrored"
+            sheets.append(Sheet(nodes, sheet.material, name, fields, contacts))
     return sheets
+
+
+def _mirror(points: np.ndarray, axis: int, centre: float) -> np.ndarray:
+    """Points (2, ...) mirrored where the coordinate `axis` is `centre`."""
+    mirrored = points.copy()
+    mirrored[axis] = 2 * centre - mirrored[axis]
+    return mirrored
 
 
 def draw_fields(
@@ -331,7 +342,8 @@ def draw_blocks(
         draw_grid_lines(axes, sheet.nodes * scale, *(("k", 0.35) if name else (own, 1.0)))
     interfaces, outer = trace_outline(sheets)
     axes.add_collection(LineCollection([line.T * scale for line in outer], **OUTLINE))
-    axes.add_collection(LineCollection([line.T * scale for _, line in interfaces], **INTERFACE))
+    lines = [line for _, line in interfaces] + [c for sheet in sheets for c in sheet.contacts]
+    axes.add_collection(LineCollection([line.T * scale for line in lines], **INTERFACE))
     axes.set_aspect("auto" if is_slender(box) else "equal")
     axes.set_xlim(box[0] * scale, box[1] * scale)
     axes.set_ylim(box[2] * scale, box[3] * scale)

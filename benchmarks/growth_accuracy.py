@@ -53,8 +53,8 @@ def measure_row(materials: str, **deck) -> Measured | None:
         rows.append({"t": evolution.t, **problem.measure(evolution)})
     history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     rate = growth.measure_rate(history, mode, window.first, window.last)
-    theory = problem.theory.get_mean_rate(window.first, window.last)
-    scale = problem.theory.base.u if is_still(problem.theory, theory) else theory
+    theory = problem.linear_growth.get_mean_rate(window.first, window.last)
+    scale = problem.linear_growth.base.u if is_still(problem.linear_growth, theory) else theory
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
     kct = get_kct(problem, history["t"])
     last = int(np.searchsorted(kct, window.last, side="right")) - 1

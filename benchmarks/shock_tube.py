@@ -100,7 +100,7 @@ def compute_growth(one: Experiment, cells: int, end: float) -> dict:
         "start": "incident", "cells": cells, "stretch": 1.03, "line": {"thickness": 1.2e-3},
         "output": {"dumps": 2},
     }  # fmt: skip
-    theory = sg.load("interface-instability", **settings).problem.theory
+    theory = sg.load("interface-instability", **settings).problem.linear_growth
     settings["kct_end"] = end / one.rate[0] * theory.sound_speed
     with tempfile.TemporaryDirectory() as place:
         history = sg.run("interface-instability", f"{place}/run", **settings).history

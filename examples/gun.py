@@ -17,8 +17,7 @@ class GunDeck(sg.Deck, kw_only=True):
 class Gun(sg.Problem):
     Deck = GunDeck
 
-    @property
-    def theory(self):
+    def compute_shock(self):
         """Mach number of the shock and pressure behind it, over that at rest."""
         half = 0.25 * (self.deck.gamma + 1.0) * self.deck.speed
         mach = half + math.sqrt(half * half + 1.0)
@@ -39,7 +38,7 @@ class Gun(sg.Problem):
         shocked = p > 0.5 * (1.0 + p[0])
         return {"pressure": float(p[: max(1, shocked.sum() // 2)].mean())}
 
-    def report(self, history, final=None):
-        mach, pressure = self.theory
-        row = sg.compare_column(history, "pressure", pressure, "pressure behind", error="pressure")
+    def report(self, run):
+        mach, pressure = self.compute_shock()
+        row = run.compare("pressure", pressure, "pressure behind", error="pressure")
         return sg.Report(f"a shock of Mach {mach:.3f}", [row])

@@ -48,7 +48,8 @@ from shockgrid.problems.deck import (
     key,
     place_file,
 )
-from shockgrid.problems.problem import Problem, Report
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.report import Report
 from shockgrid.problems.solids import BodyTable, SolidDeck, find_laws, list_fluids
 from shockgrid.regrid.domains import distribute_by_arc_length
 from shockgrid.regrid.equidistribution.weights import Expression
@@ -388,9 +389,9 @@ class Blocks(Problem):
     def make_grids(self, t=0.0):
         return self.grids
 
-    def cautions(self, history=None) -> list[str]:
-        """On contacts; without a history the grids are made, so that a check tells of faults."""
-        if history is None:
+    def cautions(self, run) -> list[str]:
+        """On contacts; before a run the grids are made, so that a check tells of faults."""
+        if not run.begun:
             self.build()
         sides = [side for table in self.deck.block for side in table.side]
         surfaces = [side for side in sides if side.kind == "free-surface"]
@@ -482,10 +483,10 @@ class Blocks(Problem):
             for name, number in zip(MEASURED, measure_means(block), strict=True)
         }
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         notes = []
-        for name in (block.name for block in self.deck.block if history):
-            u, v, x, p = (history[f"{what}_{name}"] for what in MEASURED)
+        for name in (block.name for block in self.deck.block if run.begun):
+            u, v, x, p = (run.history[f"{what}_{name}"] for what in MEASURED)
             notes.append(
                 f"{name}: mean velocity {u[-1]:.5g} m/s along x, {v[-1]:.3g} along y; its centre "
                 f"of mass went {x[-1] - x[0]:.4g} m along x; pressure up to {max(p):.4g} Pa"

@@ -21,7 +21,8 @@ from typing import Literal
 import numpy as np
 
 from shockgrid.problems.deck import Deck, Regrid, RunControl, key
-from shockgrid.problems.problem import Problem, Report, Row
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.report import Report, Row
 from shockgrid.regrid.domains import DOMAINS, MovingDomain, make_domain
 from shockgrid.regrid.errors import RegridFailure
 from shockgrid.regrid.measure.quality import (
@@ -121,13 +122,13 @@ class GridMarch(Problem):
             return {"shift_error": float(np.abs(nodes - exact).max() / domain.cell)}
         return {}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
         rows = []
-        steps = np.isfinite(history["dt"])
-        made = {name: values[steps] for name, values in history.items()}
+        steps = np.isfinite(run.history["dt"])
+        made = {name: values[steps] for name, values in run.history.items()}
         if not steps.any():
-            return Report("no step was made" if history else "")
+            return Report("no step was made" if run.begun else "")
         for name, (label, reduce, wanted) in NUMBERS.items():
             if name in made:
                 value = float(reduce(made[name]))

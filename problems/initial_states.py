@@ -27,9 +27,11 @@ from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.step import take_step
 from shockgrid.problems.deck import DeckTable, key
 from shockgrid.problems.pictures import Colours, draw_field, make_panels, title_time
-from shockgrid.problems.problem import BlockPlan, Problem, find_crossing, say_unreached
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.exact_flows import average_points
 from shockgrid.problems.references.hugoniot import Shock, shock_with_mach
+from shockgrid.problems.report import RunSoFar
+from shockgrid.problems.signals import find_crossing
 from shockgrid.regrid.compilation.contents import is_of_packages
 from shockgrid.regrid.compilation.kept_files import remember
 from shockgrid.regrid.errors import BadInput
@@ -199,10 +201,10 @@ class RadialProblem(Problem):
         whole = float((exact * weight).sum())
         return float((error * weight).sum()) / whole if whole > 0.0 else math.nan
 
-    def list_notes(self, history) -> list[str]:
+    def list_notes(self, run: RunSoFar) -> list[str]:
         """Sentences below the report."""
         deck = self.deck
-        notes = say_unreached(history, "error_rho")
+        notes = run.say_unreached("error_rho")
         known = deck.cells == 100 and deck.geometry in self.peers
         return notes + ([f"other codes: {self.peers[deck.geometry]}"] if known else [])
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shockgrid.problems.deck import key
-from shockgrid.problems.problem import History, Row
+from shockgrid.problems.report import History, Row
 
 ONE_MICROSECOND = 1e-6
 Trace = tuple[tuple[float, float], ...]

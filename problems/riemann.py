@@ -30,20 +30,15 @@ from shockgrid.hydro.links import join
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import Fluid, make_plane_grid, put_walls
 from shockgrid.problems.pictures import name_axis, title_time
-from shockgrid.problems.problem import (
-    Problem,
-    Report,
-    average_plateau,
-    compare,
-    get_last,
-    keep_until,
-)
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.riemann import (
     RiemannSolution,
     compute_cell_averages,
     solve_riemann,
 )
+from shockgrid.problems.report import Report
+from shockgrid.problems.signals import average_plateau
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.roots import find_root
 
@@ -302,7 +297,7 @@ class Riemann(Problem):
         sides = (case.left_eos, exact.rho_left), (case.right_eos, exact.rho_right)
         return min(float(eos.energy(rho, exact.p)) for eos, rho in sides) / (0.5 * speed * speed)
 
-    def cautions(self, history=None) -> list[str]:
+    def cautions(self, run) -> list[str]:
         """Before a run that gases part near vacuum speed, after it what this has done; shocks
         beyond a Hugoniot."""
         case = self.case
@@ -310,9 +305,9 @@ class Riemann(Problem):
         cautions = []
         for side, eos in sides:
             cautions += caution_fit(f"the {side} material", eos, self.exact.p)
-        return cautions + self.caution_stars(history)
+        return cautions + self.caution_stars(run)
 
-    def caution_stars(self, history) -> list[str]:
+    def caution_stars(self, run) -> list[str]:
         """What is off the exact solution, or may be, by how much and why."""
         heat = self.measure_heat_left()
         ratio = find_pressure_ratio(self.case, self.exact.p)
@@ -321,7 +316,7 @@ class Riemann(Problem):
             f"and their heat to {100.0 * heat:.2g} % of their kinetic energy, whose errors are "
             "errors of the pressure"
         )
-        rows = self.report(history).rows if history is not None else []
+        rows = self.report(run).rows if run.begun else []
         known = [row for row in rows if not math.isnan(row.difference)]
         if not known:
             if heat >= COLD_ENERGY_PART:
@@ -466,22 +461,21 @@ class Riemann(Problem):
             for name, value in zip(STARS, values, strict=True)
         }
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
         exact = self.exact
         notes = []
         leaving = self.find_leaving_time()
-        if history and history["t"][-1] > leaving:
-            history = keep_until(history, leaving)
+        if run.begun and run.t > leaving:
+            run = run.until(leaving)
             notes.append(
                 f"a wave meets an end of the domain at t = {leaving:.4g}: "
                 "compared up to there; longer `lengths` let the run go on"
             )
-        t = get_last(history, "t")
+        t = run.t
         where = "on a grid line" if self.on_line else f"captured, grid {deck.mesh}"
         rows = [
-            compare(
-                history, f"star_{name}", float(value), name.replace("_", " "), size=float(size),
+            run.compare(f"star_{name}", float(value), name.replace("_", " "), size=float(size),
                 digits=9, studied=True,
             )
             for name, (value, size) in self.star_states().items()
@@ -490,11 +484,11 @@ class Riemann(Problem):
             f"the {side} plateau, {abs(wave.tail - exact.u) * t:.3g} m wide, has no cell in its "
             "middle half: more cells, lengths left out, or a larger grading"
             for side, wave in (("left", exact.left_wave), ("right", exact.right_wave))
-            if history and math.isnan(history[f"star_p_{side}"][-1])
+            if run.begun and math.isnan(run.last(f"star_p_{side}"))
         ]
         head = (
             f"riemann problem {self.name!r}, {deck.cells} cells, contact {where}: L1(rho) = "
-            f"{get_last(history, 'l1_rho'):.3g}; star states beside the contact:"
+            f"{run.last('l1_rho'):.3g}; star states beside the contact:"
         )
         return Report(head, rows, notes)
 

@@ -31,9 +31,11 @@ from shockgrid.hydro.motion.smoothing import THICK_CELLS
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
 from shockgrid.problems.initial_states import make_plane_grid, mix_states, put_walls
 from shockgrid.problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
-from shockgrid.problems.problem import Problem, Report, Row, align, find_time, get_last
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.hugoniot import shock_with_mach
 from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.report import Report, Row, align
+from shockgrid.problems.signals import find_time
 from shockgrid.regrid.algebraic import fill_from_sides
 from shockgrid.regrid.measure.cells import compute_area_fractions
 
@@ -298,7 +300,7 @@ class ShockBubble(Problem):
         A window is complete when the run has passed its end; of the rearmost point's, a third
         suffices.  The line is fitted to equally many places in equal times.
         """
-        leaves = find_time(history, history["axis_front"] > history["downwind"])
+        leaves = find_time(history["t"], history["axis_front"] > history["downwind"])
         start, end = (
             leaves + float(mark.partition("+")[2] or 0.0) * SECONDS_PER_MICROSECOND
             if isinstance(mark, str)  # from the refracted shock's exit on
@@ -314,10 +316,11 @@ class ShockBubble(Problem):
         places = np.interp(t, history["t"], history[feature.column])
         return (start, end), float(np.polyfit(t - t[0], places, 1)[0])
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """Errors are those of velocities against the experiment's, or the fixed grid's where it has
         none; of the upwind end's first speed against the plane contact's; of the focus' time."""
-        if not history:
+        history = run.history
+        if not run.begun:
             return Report()
         deck = self.deck
         t = history["t"]
@@ -348,7 +351,7 @@ class ShockBubble(Problem):
             "after the shock's arrival:"
         ]
         lines += align(table) if len(table) > 1 else []
-        ends = [1e3 * get_last(history, name) for name in ("upwind", "downwind", "height")]
+        ends = [1e3 * run.last(name) for name in ("upwind", "downwind", "height")]
         notes = [
             f"plane waves: shock {self.shock.shock_speed:.1f}, refracted shock "
             f"{self.contact.right_wave.head:.1f}, contact {self.contact.u:.1f} m/s; the upwind "

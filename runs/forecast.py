@@ -17,7 +17,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from shockgrid.problems.problem import Problem, estimate_memory, plan_blocks
+from shockgrid.problems.memory import estimate_memory
+from shockgrid.problems.problem import Problem, plan_blocks
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.deck.checking import find_changes
 from shockgrid.runs.deck.reading import ReadDeck

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from shockgrid.problems.deck import Deck, DeckTable, Output, Regrid, RunControl, key
     from shockgrid.problems.initial_states import make_plane_grid, put_walls, shock
     from shockgrid.problems.pictures import draw_field
-    from shockgrid.problems.problem import Problem, Report, Row
-    from shockgrid.problems.problem import compare as compare_column
+    from shockgrid.problems.problem import Problem
+    from shockgrid.problems.report import Report, Row
     from shockgrid.regrid.algebraic import AlgebraicRegridder, transfinite_grid
     from shockgrid.regrid.barrier.regridder import BarrierRegridder
     from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
@@ -73,8 +73,8 @@ MODULES = {
     "Problem": "shockgrid.problems.problem",
     "Regrid": "shockgrid.problems.deck",
     "RegridFailure": "shockgrid.regrid.errors",
-    "Report": "shockgrid.problems.problem",
-    "Row": "shockgrid.problems.problem",
+    "Report": "shockgrid.problems.report",
+    "Row": "shockgrid.problems.report",
     "RunControl": "shockgrid.problems.deck",
     "RunFailure": "shockgrid.regrid.errors",
     "Segment": "shockgrid.hydro.boundary",
@@ -84,7 +84,6 @@ MODULES = {
     "StrengthLaw": "shockgrid.hydro.strength.laws.base",
     "Tabular": "shockgrid.hydro.eos.tabular",
     "compare": "shockgrid.runs.inspection.compare",
-    "compare_column": "shockgrid.problems.problem",
     "draw_field": "shockgrid.problems.pictures",
     "film": "shockgrid.runs.pictures.film",
     "find_material": "shockgrid.hydro.eos.materials",
@@ -113,7 +112,6 @@ MODULES = {
     "verify": "shockgrid.runs.interface.calls",
 }
 ELSEWHERE = {
-    "compare_column": "compare",
     "film": "make_film",
     "gravity": "make_gravity",
     "open": "open_run",
@@ -154,7 +152,6 @@ __all__ = [
     "Tabular",
     "__version__",
     "compare",
-    "compare_column",
     "draw_field",
     "film",
     "find_material",

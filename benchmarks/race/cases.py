@@ -71,9 +71,9 @@ def make_shocked_interface(deck: str, **settings: Any) -> dict[str, Any]:
     (rho, u, p) behind the shock, before it and beyond the interface.
     """
     problem = sg.load(deck, cells=16, **settings).problem
-    base = problem.theory.base
+    base = problem.linear_growth.base
     shock = problem.shock
-    sound = problem.theory.sound_speed
+    sound = problem.linear_growth.sound_speed
     ka0 = problem.deck.modes[0].ka0
     return {
         "gamma": GAMMA,
@@ -99,10 +99,10 @@ def make_growth(name: str = "growth") -> Case:
     problem = sg.load("interface-instability", cells=16, kct_end=25.0).problem
     wavenumber = 2.0 * math.pi
     times = [kct / numbers["k_c"] for kct in (6.0, 25.0)]
-    first, last = (float(problem.theory.get_amplitude(wavenumber, t)) for t in times)
+    first, last = (float(problem.linear_growth.get_amplitude(wavenumber, t)) for t in times)
     scale = numbers["a0"]  # theory's amplitude is in parts of the first
     mean_square = (wavenumber * scale) ** 2 * (first**2 + first * last + last**2) / 3.0
-    saturation = (4.0 * problem.theory.atwood**2 + 1.0) / 8.0 * mean_square
+    saturation = (4.0 * problem.linear_growth.atwood**2 + 1.0) / 8.0 * mean_square
     rate = scale * (last - first) / (times[1] - times[0])
     numbers |= {"times": times, "rate": rate * (1.0 - saturation)}
     title = "growth of a shocked interface, Mach 1.5, density ratio 3, k a0 = 0.02"

@@ -40,8 +40,9 @@ from shockgrid.problems.deck import (
     check_solid,
     key,
 )
-from shockgrid.problems.problem import Problem, check_memory, find_crossing
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.signals import find_crossing
 from shockgrid.problems.solids import SolidDeck, find_laws
 
 Touch = Literal["joined", "sliding"]
@@ -137,7 +138,7 @@ class ConicalTarget(seen.Results, Problem):
         self.ripple = Ripple(deck, self.materials, self.impact)
         self.layout = Layout(deck, self.ripple)
         if self.ripple:
-            check_memory(self)  # grids are made here
+            self.check_memory()  # grids are made here
             self.ripple.check(self.layout.along, self.make_grids())
 
     def _match_impact(self) -> tuple[float, float, float]:

@@ -21,9 +21,10 @@ from shockgrid.problems.pictures import (
     draw_lines,
     make_panels,
 )
-from shockgrid.problems.problem import Report, Row, fit_slope, reduce_between
 from shockgrid.problems.references.hugoniot import caution_fit, shock_to_pressure
 from shockgrid.problems.references.shock_polars import CrossedLine
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import fit_slope, reduce_between
 from shockgrid.problems.solids import list_fluids
 from shockgrid.regrid.curves import compute_arc_lengths
 from shockgrid.regrid.errors import BadInput
@@ -244,9 +245,10 @@ class Results:
     """What the problem says of a run, a part of its class: its report and its pictures, in which
     each material has one colour."""
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """What was computed, beside theory where there is one."""
-        if not history:
+        history = run.history
+        if not run.begun:
             return Report(rows=[Row("impact", theory=self.impact[0])])
         deck = self.deck
         t = history["t"]
@@ -311,7 +313,7 @@ class Results:
             )
         return Report(head, rows)
 
-    def cautions(self, history=None) -> list[str]:
+    def cautions(self, run) -> list[str]:
         """Materials beyond their Hugoniots at the impact, fluids among solids."""
         deck = self.deck
         beyond = [

@@ -27,7 +27,8 @@ from shockgrid.hydro.convection.tensor_grids import make_axis
 from shockgrid.problems.deck import DeckTable, key
 from shockgrid.problems.initial_states import make_plane_grid
 from shockgrid.problems.pictures import draw_grid, make_panels
-from shockgrid.problems.problem import BlockPlan, Problem, get_last
+from shockgrid.problems.problem import BlockPlan, Problem
+from shockgrid.problems.report import RunSoFar
 
 # of factorised matrices per cell to the power 1.5, at the peak of a run: measured 4.5 kB a cell of
 # 10 000, 7.6 of 80 000, 21 of 320 000 (heat flux), 8.9 of 490 000 (given temperatures)
@@ -271,9 +272,9 @@ class BoxProblem(Problem):
         fluid = f"Ra = {deck.rayleigh:g}, Pr = {deck.prandtl:g}"
         return f"{fluid}, {across} x {up} cells, grid {deck.grid.kind}"
 
-    def say_lost_volume(self, history) -> str:
+    def say_lost_volume(self, run: RunSoFar) -> str:
         """A sentence on the conservation of volume in the last step."""
-        lost = get_last(history, "mass_residual")
+        lost = run.last("mass_residual")
         return f"volume lost in a cell, over the largest flux: {lost:.1e}"
 
     def read_dump(self, dump) -> tuple[Any, Equations, np.ndarray]:

@@ -24,8 +24,9 @@ import numpy as np
 from shockgrid.hydro.convection import columns
 from shockgrid.problems.convection.boxes import AxisGrid
 from shockgrid.problems.deck import Deck, Output, RunControl, key
-from shockgrid.problems.problem import Problem, Report, compare, get_last, say_unreached
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.convection import VerticalPlates
+from shockgrid.problems.report import Report
 
 ROUND_OFF_SWING = 1e-12  # relative: differences below are rounding, no swing
 LONGEST_DIFFUSIVE_TIMES = 50.0  # slowest diffusive times that a run may take: steady long before
@@ -85,16 +86,16 @@ class Convection1D(Problem):
             return dict.fromkeys(ERRORS, math.nan)
         return measure_errors(self.exact, evolution.x, evolution.temperature, evolution.velocity)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """Errors of the profiles at the end, and the heat through the slot."""
         deck = self.deck
-        change = get_last(history, "change")
+        change = run.last("change")
         rows = [
-            compare(history, "error_T", label="largest error of T [K]", digits=3),
-            compare(history, "error_v", label="largest error of v, of its largest", digits=3),
-            compare(history, "nusselt", self.exact.compute_nusselt(), "heat", digits=9),
+            run.compare("error_T", label="largest error of T [K]", digits=3),
+            run.compare("error_v", label="largest error of v, of its largest", digits=3),
+            run.compare("nusselt", self.exact.compute_nusselt(), "heat", digits=9),
         ]
-        notes = say_unreached(history, "error_v")
+        notes = run.say_unreached("error_v")
         if change >= columns.STEADY_CHANGE and not notes:
             notes.append(
                 f"NOT STEADY: the state still changes by {change:.1e} in a diffusive time, and the "

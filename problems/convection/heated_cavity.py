@@ -22,8 +22,8 @@ from shockgrid.hydro.convection.box import Wall, make_fluid
 from shockgrid.hydro.convection.steady import SteadySolver, make_rest
 from shockgrid.problems.convection.boxes import SIDES, AxisGrid, BoxProblem, SteadyEvolution
 from shockgrid.problems.deck import Deck, DeckTable, Output, RunControl, key
-from shockgrid.problems.problem import Report, compare, get_last
 from shockgrid.problems.references.convection import AIR_PRANDTL, STATES, CavityState
+from shockgrid.problems.report import Report
 from shockgrid.regrid.errors import BadInput
 
 CAVITY_MARCH_TIME = 0.2  # of a march in time: past the swings of the start
@@ -139,26 +139,27 @@ class HeatedCavity(BoxProblem):
             return None
         return STATES.get(deck.rayleigh)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """The quantities of the reference, with its values where there are any."""
+        history = run.history
         deck = self.deck
         reference = self.find_reference()
         head = self.describe()
         rows = [
-            compare(history, name, getattr(reference, name, math.nan), label)
+            run.compare(name, getattr(reference, name, math.nan), label)
             for name, label in ROWS.items()
         ]
-        if not history:
+        if not run.begun:
             return Report(head, rows)
         notes = [] if reference else ["there is no reference for this deck"]
         passes = deck.bottom.heat == deck.top.heat == "adiabatic"
         if passes and history["nusselt"][-1] != 0.0:
             balance = history["nusselt_right"][-1] / history["nusselt"][-1] - 1.0
             notes.append(f"heat out at the right over heat in at the left, less 1: {balance:.1e}")
-        notes.append(self.say_lost_volume(history))
+        notes.append(self.say_lost_volume(run))
         if deck.method == "steady":
-            part = get_last(history, "buoyancy")
-            change = get_last(history, "change")
+            part = run.last("buoyancy")
+            change = run.last("change")
             if part < 1.0 or change > deck.tolerance:
                 head += (
                     f"\nNOT STEADY: these are iterates at Ra = {part * deck.rayleigh:.3g} that "

@@ -24,8 +24,9 @@ import numpy as np
 
 from shockgrid.hydro.convection.columns import DRAWN_BLOCK_HEIGHT, FAMILIES, FrontRace, Placing
 from shockgrid.problems.deck import Deck, DeckTable, RunControl, key
-from shockgrid.problems.problem import BlockPlan, Problem, Report, align
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.convection import BurgersFronts
+from shockgrid.problems.report import Report, align
 
 WORDS = {
     "fixed": "nodes at rest",
@@ -96,12 +97,13 @@ class MovingGrid1D(Problem):
         """Mean errors of the four."""
         return evolution.measure_errors()
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """The table of the four families at the end time."""
+        history = run.history
         deck = self.deck
         steps = max(1, len(history["t"]) - 1)
-        if not history or history["t"][-1] < 0.999999 * self.t_end:
-            if not history:
+        if not run.begun or history["t"][-1] < 0.999999 * self.t_end:
+            if not run.begun:
                 return Report("")
             return Report(
                 "moving-grid-1d: the families are compared at the end time, which is not reached"

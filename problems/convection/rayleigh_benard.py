@@ -27,8 +27,8 @@ from shockgrid.hydro.convection.box import PERIODIC, adiabatic, isothermal, make
 from shockgrid.problems.convection.boxes import AxisGrid, BoxProblem
 from shockgrid.problems.deck import Deck, Output, RunControl, key
 from shockgrid.problems.pictures import make_panels
-from shockgrid.problems.problem import Report, Row, compare
 from shockgrid.problems.references import convection as linear
+from shockgrid.problems.report import Report, Row, RunSoFar
 from shockgrid.regrid.errors import BadInput
 
 BENARD_MARCH_TIME = 1.5
@@ -126,11 +126,11 @@ class RayleighBenard(BoxProblem):
         rest = measure.solve_rest(equations, self.fluid)
         return rest, *measure.compute_growth(equations, self.fluid, *rest)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         rows = [Row("onset", theory=self.onset)]
-        return Report((lambda: str(self.compute_report(history))) if history else "", rows)
+        return Report((lambda: str(self.compute_report(run))) if run.begun else "", rows)
 
-    def compute_report(self, history) -> Report:
+    def compute_report(self, run: RunSoFar) -> Report:
         """Onset and growth rate beside linear theory, heat transported at the end."""
         deck = self.deck
         rows = []
@@ -148,17 +148,16 @@ class RayleighBenard(BoxProblem):
                 numbers = deck.rayleigh, deck.prandtl, 2.0 * math.pi / self.width
                 theory = linear.compute_layer_growth(*numbers, deck.walls == "free")
             rows.append(Row("eigenvalue", rate, theory, "growth rate, eigenvalue [1/s]"))
-            seen = measure_growth(history["t"], history["kinetic_energy"])
-            if history["kinetic_energy"][0] < STILL_ENERGY_RATIO * deck.amplitude**2:
+            energy = run.history["kinetic_energy"]
+            seen = measure_growth(run.history["t"], energy)
+            if energy[0] < STILL_ENERGY_RATIO * deck.amplitude**2:
                 notes.append("the disturbance that decays most slowly is heat alone: nothing moves")
             elif math.isfinite(seen):
                 rows.append(Row("growth", seen, rate, "growth rate, in time [1/s]"))
                 notes.append("growth in time: beside the eigenvalue")
-        rows.append(compare(history, "nusselt", label="Nu, floor"))
-        rows.append(compare(history, "nusselt_top", label="Nu, ceiling"))
-        return Report(
-            f"{deck.shape}, {self.describe()}", rows, [*notes, self.say_lost_volume(history)]
-        )
+        rows.append(run.compare("nusselt", label="Nu, floor"))
+        rows.append(run.compare("nusselt_top", label="Nu, ceiling"))
+        return Report(f"{deck.shape}, {self.describe()}", rows, [*notes, self.say_lost_volume(run)])
 
     def draw_growth(self, figure, run_data) -> None:
         """Kinetic energy and Nusselt number against time, with the growth of the eigenvalue."""

@@ -74,7 +74,7 @@ class CrossedStart:
     def __init__(self, problem, since: float):
         self.problem = problem
         self.since = since
-        self.base = problem.theory.base
+        self.base = problem.linear_growth.base
         self.shock = problem.shock
         self.y = problem.make_heights()
         self.first_line = problem.shape(self.y)
@@ -83,7 +83,7 @@ class CrossedStart:
     @functools.cached_property
     def fields(self) -> list:
         """Linear theory's perturbed flow of each harmonic at T."""
-        theory = self.problem.theory
+        theory = self.problem.linear_growth
         return [theory.compute_fields(wave.wavenumber * self.since) for wave in self.waves]
 
     def sum_waves(self, y: np.ndarray, parts, sine: bool = False) -> np.ndarray:
@@ -210,7 +210,7 @@ class Side:
         until then is part of it (theory F15.6).  Lines beyond the reach are straight.
         """
         start = self.start
-        theory = self.start.problem.theory
+        theory = self.start.problem.linear_growth
         front = self.away[self.places[-1]]
         amplitudes = [flow.amplitude]
         for speed in self.speeds:

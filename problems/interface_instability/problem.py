@@ -283,7 +283,7 @@ class InterfaceInstability(Results, Problem):
         """
         if self.deck.start == "incident" or self.deck.diffusion_thickness > 0.0:
             return "incident"
-        base = self.theory.base
+        base = self.linear_growth.base
         lengths = self.deck.lengths
         fault = ""
         if base.gap:
@@ -312,12 +312,12 @@ class InterfaceInstability(Results, Problem):
         cells = self.deck.layer or choose_layer(self.deck.cells / shortest)
         layer = cells * self.deck.wavelength / self.deck.cells
         passage = self.amplitude / self.shock.shock_speed
-        return max(layer / find_nearer_speed(self.theory.base), CLEAR_TIME_RATIO * passage)
+        return max(layer / find_nearer_speed(self.linear_growth.base), CLEAR_TIME_RATIO * passage)
 
     def _find_ways(self, since: float) -> tuple[float, float]:
         """What of both lengths [m] waves take up to `since` [s] after the shock's arrival: how far
         the piston is behind it then and the reflected wave on its way back, and the other's way."""
-        base = self.theory.base
+        base = self.linear_growth.base
         shock = self.shock
         begun = (self.deck.gap * self.deck.wavelength + self.amplitude) / shock.shock_speed + since
         back = shock.particle_speed * begun - base.left_wave.head * since
@@ -345,7 +345,7 @@ class InterfaceInstability(Results, Problem):
         return THICK_CELLS * self.deck.wavelength / self.deck.cells if given is None else given
 
     @functools.cached_property
-    def theory(self) -> LinearGrowth:
+    def linear_growth(self) -> LinearGrowth:
         """Linear compressible growth for the deck's materials and shock."""
         fluids = self.eos_first, self.rho_first, self.eos_second, self.rho_second
         end = max(30.0, self.deck.kct_end)
@@ -354,7 +354,7 @@ class InterfaceInstability(Results, Problem):
     @functools.cached_property
     def c_first(self) -> float:
         """Sound speed [m/s] of the first material behind the wave that the interface sends back."""
-        base = self.theory.base
+        base = self.linear_growth.base
         return float(self.eos_first.sound_speed(base.rho_left, base.p))
 
     @property
@@ -367,7 +367,7 @@ class InterfaceInstability(Results, Problem):
     @property
     def _rate(self) -> float:
         """k c [1/s]."""
-        return self.k * self.theory.sound_speed
+        return self.k * self.linear_growth.sound_speed
 
     def shape(self, y: np.ndarray) -> np.ndarray:
         """First place x of the interface at the heights `y` (its mean is x = 0)."""
@@ -419,7 +419,7 @@ class InterfaceInstability(Results, Problem):
         """First places x [m] of the far sides."""
         first, second = self.choose_lengths()
         if self.has_open_ends:
-            place = -self.theory.base.u * self.arrival
+            place = -self.linear_growth.base.u * self.arrival
             return place - first, place + second
         return self.shock.particle_speed * self.begun - first, second
 
@@ -430,7 +430,7 @@ class InterfaceInstability(Results, Problem):
         """
         if self.deck.lengths is not None:
             return self.deck.lengths
-        base = self.theory.base
+        base = self.linear_growth.base
         t0 = self.arrival
         t_end = self.deck.run.t_set_up or self.t_end
         margin = self.amplitude + 0.5 * self.deck.wavelength
@@ -450,7 +450,7 @@ class InterfaceInstability(Results, Problem):
 
     def _find_first_echo(self, length: float) -> float:
         """When the wave that the interface sends to the piston is back, at the earliest [s]."""
-        base = self.theory.base
+        base = self.linear_growth.base
         t0 = self.arrival
         push = self.shock.particle_speed
         head = base.left_wave.head
@@ -462,12 +462,12 @@ class InterfaceInstability(Results, Problem):
 
     def _find_chase(self) -> float:
         """At most how fast the wave that the piston sends back nears the interface [m/s]."""
-        u = self.theory.base.u
+        u = self.linear_growth.base.u
         return 1.1 * self.c_first + max(self.shock.particle_speed, u) - u
 
     def _find_second_echo(self) -> tuple[float, float]:
         """Speeds [m/s] of the transmitted shock, and of the one back from the far wall."""
-        base = self.theory.base
+        base = self.linear_growth.base
         echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
         return base.right_wave.head, echo.shock_speed
 
@@ -477,21 +477,21 @@ class InterfaceInstability(Results, Problem):
         Not for two shocks, of which the second sends waves of its own.
         """
         first, second = self.choose_lengths()
-        base = self.theory.base
+        base = self.linear_growth.base
         if self.has_open_ends:
             waves = (
                 ("first", first, base.u - base.left_wave.head, self.c_first),
-                ("second", second, base.right_wave.head - base.u, self.theory.sound_speed),
+                ("second", second, base.right_wave.head - base.u, self.linear_growth.sound_speed),
             )
             return {name: self.arrival + way / out + way / c for name, way, out, c in waves}
         front, back = self._find_second_echo()
-        late = second * (front - self.theory.base.u + back) / (front * back)
+        late = second * (front - self.linear_growth.base.u + back) / (front * back)
         return {"first": self._find_first_echo(first), "second": self.arrival + late}
 
     def find_echo_speeds(self) -> dict[str, float]:
         """How fast these waves run towards the interface [m/s], by the block's name."""
         if self.has_open_ends:
-            return {"first": self.c_first, "second": self.theory.sound_speed}
+            return {"first": self.c_first, "second": self.linear_growth.sound_speed}
         return {"first": self._find_chase(), "second": self._find_second_echo()[1]}
 
     @functools.cached_property
@@ -507,7 +507,7 @@ class InterfaceInstability(Results, Problem):
         """How cells that are finer for the passage grow when its waves have left them."""
         if self.spacing.finer == 1.0:
             return None
-        base = self.theory.base
+        base = self.linear_growth.base
         laws = {}
         ways = []
         for name, length in zip(("first", "second"), self.choose_lengths(), strict=True):
@@ -518,7 +518,7 @@ class InterfaceInstability(Results, Problem):
             self._find_last_arrival()
             + FINE_ZONE_WAVELENGTHS * self.deck.wavelength / find_nearer_speed(base)
         )
-        slowest = min(self.theory.sound_speed, self.c_first)
+        slowest = min(self.linear_growth.sound_speed, self.c_first)
         return Respacing(laws, start, start + 1.5 * max(ways) / (NODE_SPEED * slowest))
 
     def estimate_cells(self) -> int:
@@ -551,7 +551,7 @@ class InterfaceInstability(Results, Problem):
         columns = [len(self.spacing.make(length)) - 1 for length in self.choose_lengths()]
         if self.start == "crossed":  # whose cells fit to the fronts
             columns = [side.away.size - 1 for side in self.crossed.sides]
-            front = front - self.theory.base.u * self.arrival
+            front = front - self.linear_growth.base.u * self.arrival
         spans = (("first", low, front.max()), ("second", front.min(), high))
         plans = [
             BlockPlan(name, (count, len(y) - 1), (float(low), 0.0), (float(high), float(y[-1])))
@@ -679,7 +679,7 @@ class InterfaceInstability(Results, Problem):
         ahead = self.rho_second, 0.0, 0.0, self.deck.pressure
         for (block, part), side, state in ((low, "i_min", behind), (high, "i_max", ahead)):
             options = {} if part is None else {"carried": dict.fromkeys(SEEN_FIELDS, part)}
-            speed = self.theory.base.u, 0.0
+            speed = self.linear_growth.base.u, 0.0
             put(block, side, "inflow", state=state, velocity=speed, **options)
 
     def choose_family(self, nodes: np.ndarray) -> dict:
@@ -702,7 +702,7 @@ class InterfaceInstability(Results, Problem):
             return self.arrival
         start, later = self._make_second_shock()
         piston = self.shock.particle_speed
-        interface = self.theory.base.u
+        interface = self.linear_growth.base.u
         between = interface * (start - self.arrival) + self.choose_lengths()[0] - piston * start
         return start + max(0.0, between / (piston + later.shock_speed - interface))
 
@@ -741,8 +741,8 @@ class InterfaceInstability(Results, Problem):
             **(measure_line(evolution.blocks, self.make_heights()) if self.may_hand_over else {}),
         }
 
-    def cautions(self, history=None) -> list[str]:
-        return find_cautions(self, history)
+    def cautions(self, run) -> list[str]:
+        return find_cautions(self, run)
 
 
 def measure_far_speed(block: Block) -> float:

@@ -26,7 +26,8 @@ from shockgrid.problems.pictures import (
     find_dump,
     name_axis,
 )
-from shockgrid.problems.problem import Report, Row, fit_slope
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import fit_slope
 from shockgrid.regrid.measure.corners import compute_centres
 
 # times the height of the domain, beyond which panels of the interface lie one above the other
@@ -78,7 +79,7 @@ def _describe_ends(problem) -> list[str]:
 
 def _predict(problem) -> list[Row]:
     """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
-    theory = problem.theory
+    theory = problem.linear_growth
     if problem.deck.second_shock is not None:
         return []
     known = {"interface_speed": theory.base.u, "atwood_number": theory.atwood}
@@ -112,7 +113,7 @@ def _describe_modes(problem) -> str:
 
 def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
-    theory = problem.theory
+    theory = problem.linear_growth
     growth = Growth(problem)
     notes = []
     t = column["t"]
@@ -208,7 +209,7 @@ def _compare_model(growth, column, kct: float) -> Row:
     """The row of the Padé model, at the end or where its range ends."""
     problem = growth.problem
     last = min(kct, growth.model_reach)
-    t = problem.arrival + last / (problem.k * problem.theory.sound_speed)
+    t = problem.arrival + last / (problem.k * problem.linear_growth.sound_speed)
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
@@ -306,17 +307,17 @@ def _mark_handover(axes, problem, history: Mapping[str, np.ndarray], kct: np.nda
 class Results:
     """What the problem says of a run, a part of its class: its report and its pictures."""
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """Growth rates (da/dt)/(k a0) of the modes [m/s], each over the window where theory holds,
         and the speed of the interface [m/s], which studies draw; sizes by the models.
 
         No numbers for two shocks, for which there is no theory.
         """
-        theory = self.theory
+        theory = self.linear_growth
         deck = self.deck
-        if not history:
+        if not run.begun:
             return Report(rows=_predict(self))
-        column = _columns(self, history)
+        column = _columns(self, run.history)
         first, kct = (float(get_kct(self, t)) for t in (0.0, column["t"][-1]))
         times = f"to k c t = {kct:.3g}"
         if self.start == "crossed":
@@ -337,7 +338,7 @@ class Results:
         if deck.second_shock is None:
             rows, notes = _compare(self, column, kct)
         notes += _describe_ends(self)
-        notes += _describe_handover(self, history)
+        notes += _describe_handover(self, run.history)
         far = column["far_transverse_speed"].max() / theory.sound_speed
         notes.append(
             f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
@@ -442,7 +443,7 @@ class Results:
                 label=f"k c t = {kct[row]:.3g}",
             )
             if self.deck.second_shock is None and kct[row] > 0.0:
-                theory = first * predict_amplitude(self.theory, numbers * kct[row])
+                theory = first * predict_amplitude(self.linear_growth, numbers * kct[row])
                 axes.semilogy(numbers, np.abs(theory) * self.k, "--", color=colour, lw=1)
             if run.dumps:
                 curves = find_lines(find_dump(run, float(history["t"][row])).blocks)

@@ -34,6 +34,7 @@ from shockgrid.problems.interface_instability.line import Harmonic
 from shockgrid.problems.references.diffuse_layers import compute_growth_reduction
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.linear_growth import LinearGrowth, PadeModel
+from shockgrid.problems.report import RunSoFar
 
 WINDOW = (6.0, 30.0)  # k c t over which a growth rate is averaged
 LEAST_WINDOW = 1.0
@@ -60,7 +61,7 @@ class Window:
 
 def get_kct(problem, t):
     """k c t since the shock met the mean interface, k being 2 pi / wavelength."""
-    return (np.asarray(t) - problem.arrival) * problem.k * problem.theory.sound_speed
+    return (np.asarray(t) - problem.arrival) * problem.k * problem.linear_growth.sound_speed
 
 
 def predict_amplitude(theory: LinearGrowth, kct):
@@ -87,7 +88,7 @@ class Growth:
 
     def __init__(self, problem):
         self.problem = problem
-        self.theory = problem.theory
+        self.theory = problem.linear_growth
 
     @property
     def first_slope(self) -> float:
@@ -358,16 +359,16 @@ def sort_cautions(
 FREE_CAPILLARY_PHASE = 0.25
 
 
-def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str]:
-    """Sentences for the deck of an `InterfaceInstability`; with a history, for the run as well."""
+def find_cautions(problem, run: RunSoFar) -> list[str]:
+    """Sentences for the deck of an `InterfaceInstability`; of a run that has begun, for it too."""
     cautions = (
         [caution for some in sort_deck(problem) for caution in some] if problem.harmonics else []
     )
     deck = problem.deck
-    base = problem.theory.base
+    base = problem.linear_growth.base
     cautions += _caution_no_interface(problem) + _caution_few_points(problem)
-    cautions += _caution_steep_line(problem, history)
-    cautions += _caution_slow_roll(problem, history)
+    cautions += _caution_steep_line(problem, run)
+    cautions += _caution_slow_roll(problem, run)
     for name in ("first", "second"):
         side = getattr(deck, name)
         label = side.material or f"the {name} material"
@@ -396,8 +397,8 @@ def find_cautions(problem, history: Mapping[str, np.ndarray] | None) -> list[str
                 f"{2.0 * math.pi / omega:.3g} s; the theories of growth ignore it and hold "
                 f"until t = {problem.arrival + FREE_CAPILLARY_PHASE / omega:.3g} s"
             )
-    if history is not None and problem.harmonics and single:
-        cautions += _caution_line(problem, history)
+    if run.begun and problem.harmonics and single:
+        cautions += _caution_line(problem, run.history)
     return cautions
 
 
@@ -444,7 +445,7 @@ def _caution_few_points(problem) -> list[str]:
     ]
 
 
-def _caution_steep_line(problem, history) -> list[str]:
+def _caution_steep_line(problem, run: RunSoFar) -> list[str]:
     """That the first line is steeper than any that was compared, or that few cells carry it."""
     deck = problem.deck
     slope = problem.k * problem.amplitude
@@ -455,14 +456,14 @@ def _caution_steep_line(problem, history) -> list[str]:
             f"lines beyond {MOST_COMPARED_KA:g} were never compared with theory or experiment"
         )
     refining = "" if problem.may_hand_over else " or refine = true"
-    most = 0.0 if history is None else problem.k * float(np.nanmax(history["amplitude"]))
+    most = problem.k * run.most("amplitude") if run.begun else 0.0
     if most > ROLLED_UP_KA and deck.cells < LEAST_MUSHROOM_CELLS and not deck.refine:
         cautions.append(
             f"the wave has grown to k a = {most:.3g} on {deck.cells} cells per wavelength, "
             f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
             f"cells = {2 * LEAST_MUSHROOM_CELLS}{refining}"
         )
-    turns = [] if history is None else history.get("largest_turn", [])
+    turns = run.history.get("largest_turn", [])
     turns = np.asarray(turns, dtype=float)
     turns = turns[np.isfinite(turns)]  # no line of earlier versions, and none that is a field
     if turns.size:
@@ -478,17 +479,18 @@ def _caution_steep_line(problem, history) -> list[str]:
     return cautions
 
 
-def _caution_slow_roll(problem, history) -> list[str]:
+def _caution_slow_roll(problem, run: RunSoFar) -> list[str]:
     """That a wave rolls up so slowly that the scheme damps its vortex."""
-    if history is None or problem.deck.limiter in LOW_MACH:
+    if not run.begun or problem.deck.limiter in LOW_MACH:
         return []
+    history = run.history
     amplitude = history["amplitude"]
     place = int(np.nanargmax(amplitude))
     passed = history["t"][place] - history["t"][0]
     if problem.k * amplitude[place] <= ROLLED_UP_KA or passed <= 0.0:
         return []
     speed = (amplitude[place] - amplitude[0]) / passed
-    mach = float(speed / problem.theory.sound_speed)
+    mach = float(speed / problem.linear_growth.sound_speed)
     if mach >= SLOW_ROLL_MACH:
         return []
     return [
@@ -505,7 +507,7 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
     gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
     ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
-    theory = problem.theory
+    theory = problem.linear_growth
     rate = theory.impulsive  # the scale alone: a check does not wait for the linear theory
     growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
     cells = problem.deck.cells

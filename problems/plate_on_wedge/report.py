@@ -21,9 +21,9 @@ from shockgrid.problems.pictures import (
     draw_field,
     make_panels,
 )
-from shockgrid.problems.problem import Report, Row
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.shock_polars import compute_jet_speed
+from shockgrid.problems.report import Report, Row
 from shockgrid.problems.solids import list_fluids
 from shockgrid.regrid.sides import trace_outline
 
@@ -314,9 +314,10 @@ def _make_panels(figure, run) -> list[tuple]:
 class Results:
     """What the problem says of a run, a part of its class: report, cautions, pictures."""
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         """What was computed and how far it is from theory."""
-        if not history:
+        history = run.history
+        if not run.begun:
             return Report()
         deck = self.deck
         theory = self.collision
@@ -371,7 +372,7 @@ class Results:
                 )
         else:
             notes.append(f"no material faster than {JET_SPEED_RATIO:g} V")
-        times = final.times if final is not None else {}
+        times = run.final.times if run.final is not None else {}
         known = [f"{PHASES[n]} {1e6 * t:.3f} µs" for n, t in times.items() if math.isfinite(t)]
         notes += ["phases: " + "; ".join(known)] if known else []
         return Report(self.describe, rows, notes)
@@ -407,7 +408,7 @@ class Results:
             lines.append(f"    {advice}{ending}")
         return "\n".join(lines)
 
-    def cautions(self, history=None) -> list[str]:
+    def cautions(self, run) -> list[str]:
         """Where the pressure behind A is low: too few cells close to the critical angle; and where
         it is beyond the Hugoniots."""
         p = self.collision.p or 0.0

@@ -9,7 +9,7 @@ from shockgrid.hydro.motion.overlaps import is_inside
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.problems.plate_on_wedge import report
-from shockgrid.problems.problem import find_crossing
+from shockgrid.problems.signals import find_crossing
 from shockgrid.regrid.curves import compute_arc_lengths
 from shockgrid.regrid.measure.corners import compute_centres
 

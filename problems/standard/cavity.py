@@ -25,8 +25,10 @@ from shockgrid.hydro.eos.materials import find_material, find_name
 from shockgrid.problems.deck import MOST_CELLS, Regrid, RunControl, VoidFill, key
 from shockgrid.problems.initial_states import lay_rays, put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import Problem, Report, Row, find_most, find_time, measure_below
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.hugoniot import caution_fit, release, shock_with_particle_speed
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import find_time, measure_below
 from shockgrid.problems.solids import SolidDeck, find_laws
 
 
@@ -96,24 +98,25 @@ class Cavity(Problem):
         row = {"void_size": size, "void_width": width, "jet_speed": float(u[0, 0])}
         return {**row, "far_speed": float(u[-1, 0]), "most_pressure": float(p.max())}
 
-    def cautions(self, history=None) -> list[str]:
+    def cautions(self, run) -> list[str]:
         """A piston beyond the Hugoniot."""
         return caution_fit(self.deck.material, self.material.eos, self.shock.p)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         deck = self.deck
         near = self.near_speed
         p = self.shock.p
         size = history["void_size"]
-        arrival = find_time(history, history["jet_speed"] > 0.5 * near)
-        closing = find_time(history, history["void_width"] <= 1e-6 * deck.radius)
+        arrival = run.find_time(history["jet_speed"] > 0.5 * near)
+        closing = run.find_time(history["void_width"] <= 1e-6 * deck.radius)
         left = max(float(size[-1] / size[0]), 0.0)
-        most = find_most(history, "most_pressure") if math.isfinite(closing) else math.nan
+        most = run.most("most_pressure") if math.isfinite(closing) else math.nan
         rows = [
             Row("arrival", arrival, self.arrival, "arrival of the shock at the void [s]", digits=5),
             Row(
                 "near_speed",
-                find_most(history, "jet_speed"),
+                run.most("jet_speed"),
                 near,
                 "greatest speed of the jet (theory: plane surface) [m/s]",
                 digits=5,
@@ -133,7 +136,7 @@ class Cavity(Problem):
         axes = make_panels(figure, 9.5, 5.8, 2, 2)
         start = self.arrival
         last = history["t"][-1]
-        end = np.nanmin((find_time(history, history["void_width"] <= 1e-6 * radius), last))
+        end = np.nanmin((find_time(history["t"], history["void_width"] <= 1e-6 * radius), last))
         dumps = [find_dump(run_data, t) for t in (start, 0.5 * (start + end), end, last)]
         high = max(1e-9 * float(np.quantile(dump.blocks[0].p, 0.995)) for dump in dumps)
         for axis, dump in zip(axes.flat, dumps, strict=True):

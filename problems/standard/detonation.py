@@ -27,17 +27,10 @@ from shockgrid.hydro.eos.materials import find_material
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import choose_even_dumps, draw_profiles, make_panels
-from shockgrid.problems.problem import (
-    BlockPlan,
-    Problem,
-    Report,
-    Row,
-    compare,
-    find_crossing,
-    fit_slope,
-    keep_until,
-)
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.exact_flows import compute_taylor_wave, follow_burn
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import find_crossing, fit_slope
 
 
 class DetonationDeck(Deck, kw_only=True):
@@ -107,23 +100,22 @@ class Detonation(Problem):
             row["taylor_error"] = self.wave.measure_error(x, p, evolution.t)
         return row
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
         lead = FRONT_LEAD_FRACTION * deck.front * self.size
         arrival = (deck.length - lead) / self.speed
         notes = []
-        if history and history["t"][-1] > arrival:
-            history = keep_until(history, arrival)
+        if run.begun and run.t > arrival:
+            run = run.until(arrival)
             notes.append(
                 f"the front meets the far wall at t = {arrival:.4g} s: compared up to there"
             )
-        t = history["t"]
-        front = history["front"]
+        t = run.history["t"]
+        front = run.history["front"]
         speed = fit_slope(t, front, (t > 0.5 * t[-1]) & np.isfinite(front))
         rows = [
             Row("speed", speed, self.speed, "speed of the front [m/s]", error="cj_speed"),
-            compare(
-                history,
+            run.compare(
                 "pressure",
                 self.pressure,
                 "pressure behind it [GPa]" if deck.behind == "piston" else "peak pressure [GPa]",
@@ -133,8 +125,7 @@ class Detonation(Problem):
         ]
         if deck.behind == "wall":
             rows.append(
-                compare(
-                    history,
+                run.compare(
                     "taylor_error",
                     label="Taylor's wave: mean error of p",
                     digits=3,

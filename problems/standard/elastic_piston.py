@@ -27,18 +27,10 @@ from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import choose_even_dumps
-from shockgrid.problems.problem import (
-    BlockPlan,
-    History,
-    Problem,
-    Report,
-    Row,
-    find_crossing,
-    fit_slope,
-    get_last,
-    reduce_between,
-)
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.elastic_plastic import compute_piston
+from shockgrid.problems.report import Report, Row, RunSoFar
+from shockgrid.problems.signals import find_crossing, fit_slope, reduce_between
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -160,41 +152,40 @@ class ElasticPiston(Problem):
         """Whether the jumps of a perfectly plastic solid are those of this one's law."""
         return self.law is None or self.law.kind == "perfect"
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         rows = []
         if len(self.waves) == 2:
             first = self.waves[0]
             rows = [
-                self.compare(history, "precursor_speed", first.u, "precursor: speed [m/s]"),
-                self.compare(
-                    history, "precursor_stress", first.stress, "precursor: stress [GPa]", 1e9
-                ),
-                *self.compare_front(history, "precursor_place", first.shock_speed, "precursor"),
+                self.compare(run, "precursor_speed", first.u, "precursor: speed [m/s]"),
+                self.compare(run, "precursor_stress", first.stress, "precursor: stress [GPa]", 1e9),
+                *self.compare_front(run, "precursor_place", first.shock_speed, "precursor"),
             ]
         last = self.waves[-1]
         rows += [
-            self.compare(history, "stress", last.stress, "behind: stress [GPa]", 1e9),
-            self.compare(history, "deviator", last.deviator, "behind: deviator [GPa]", 1e9),
-            self.compare(history, "density", last.rho, "behind: density [kg/m3]"),
-            *self.compare_front(history, "place", last.shock_speed, "last front"),
+            self.compare(run, "stress", last.stress, "behind: stress [GPa]", 1e9),
+            self.compare(run, "deviator", last.deviator, "behind: deviator [GPa]", 1e9),
+            self.compare(run, "density", last.rho, "behind: density [kg/m3]"),
+            *self.compare_front(run, "place", last.shock_speed, "last front"),
         ]
         return Report(self.describe(), rows)
 
     def compare(
-        self, history: History, name: str, theory: float, label: str, unit: float = 1.0
+        self, run: RunSoFar, name: str, theory: float, label: str, unit: float = 1.0
     ) -> Row:
         """A column at the end beside the exact value, where there is one."""
         known = theory if self.is_exact else math.nan
-        return Row(name, get_last(history, name), known, label, unit)
+        return run.compare(name, known, label, unit=unit)
 
-    def compare_front(self, history: History, name: str, speed: float, words: str) -> list[Row]:
+    def compare_front(self, run: RunSoFar, name: str, speed: float, words: str) -> list[Row]:
         """Place of a front at the end, and its speed in the last part of the run."""
-        t = get_last(history, "t") if history else self.t_end
+        history = run.history
+        t = run.t
         late = history["t"] > (1.0 - LATE_PART) * t
         found = fit_slope(history["t"], history[name], late & np.isfinite(history[name]))
         known = speed if self.is_exact else math.nan
         return [
-            self.compare(history, name, speed * t, f"{words}: place [mm]", 1e-3),
+            self.compare(run, name, speed * t, f"{words}: place [mm]", 1e-3),
             Row(f"{name}_speed", found, known, f"{words}: speed of the front [m/s]"),
         ]
 

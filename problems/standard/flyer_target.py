@@ -39,10 +39,12 @@ from shockgrid.problems.measured_traces import (
     say_spread,
 )
 from shockgrid.problems.pictures import draw_columns
-from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_time, reduce_between
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.elastic_plastic import compute_impact
 from shockgrid.problems.references.exact_flows import compute_plate_impact, compute_window_impact
 from shockgrid.problems.references.hugoniot import caution_fit
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import reduce_between
 from shockgrid.problems.solids import (
     BodyTable,
     SolidDeck,
@@ -109,7 +111,7 @@ class FlyerTarget(Problem):
         target = deck.plates[deck.flyers]
         impact = deck.speed, target.gap, flyer.thickness, target.thickness
         hit = self.materials[deck.flyers - 1 : deck.flyers + 1]
-        self.theory = compute_plate_impact(*hit, *impact)
+        self.waves_of_impact = compute_plate_impact(*hit, *impact)
         self.is_pair = len(deck.plates) == 2
         # contacts from the start on, besides that of the impact
         others = [plate for plate in deck.plates[1:] if plate is not target]
@@ -123,14 +125,14 @@ class FlyerTarget(Problem):
         self.window = None
         if self.has_window and deck.flyers == 1 and self.are_fluids:
             sizes = deck.speed, target.thickness, behind[0].thickness
-            self.window = compute_window_impact(self.theory, *self.materials[:3], *sizes)
+            self.window = compute_window_impact(self.waves_of_impact, *self.materials[:3], *sizes)
 
     @functools.cached_property
     def impact_stress(self) -> float:
         """Stress [Pa] behind the impact: of fluids the pressure; NaN for laws without an exact
         one."""
         if self.are_fluids:
-            return self.theory.pressure
+            return self.waves_of_impact.pressure
         sides = range(self.deck.flyers - 1, self.deck.flyers + 1)
         laws = [self.laws[self.names[side]].strength for side in sides]
         if any(law is not None and law.kind != "perfect" for law in laws):
@@ -170,7 +172,7 @@ class FlyerTarget(Problem):
             put_walls(blocks[-1])
         return self.simulate(blocks)
 
-    def cautions(self, history=None) -> list[str]:
+    def cautions(self, run) -> list[str]:
         """Lengths that may be meant in mm, an end before the impact, speeds beyond a Hugoniot."""
         deck = self.deck
         cautions = [
@@ -180,15 +182,15 @@ class FlyerTarget(Problem):
             for name in ("thickness", "gap")
             if getattr(plate, name) >= LARGE_LENGTH
         ]
-        if self.t_end <= self.theory.impact:
+        if self.t_end <= self.waves_of_impact.impact:
             cautions.append(
                 f"the run ends at t = {self.t_end:.4g} s, before the impact at "
-                f"{self.theory.impact:.4g} s; take a later run.t_end, or a smaller gap"
+                f"{self.waves_of_impact.impact:.4g} s; take a later run.t_end, or a smaller gap"
             )
         hit = dict(zip((plate.material for plate in deck.plates), self.materials, strict=True))
         impact = deck.plates[deck.flyers - 1 : deck.flyers + 1]
         for name in dict.fromkeys(plate.material for plate in impact):
-            cautions += caution_fit(name, hit[name].eos, self.theory.pressure)
+            cautions += caution_fit(name, hit[name].eos, self.waves_of_impact.pressure)
         return cautions + list_fluids(self.laws)
 
     def measure(self, evolution) -> dict[str, float]:
@@ -214,16 +216,17 @@ class FlyerTarget(Problem):
         """The column of the speed that an interferometer sees."""
         return "window_speed" if self.has_window else "free_surface_speed"
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         deck = self.deck
-        theory = self.theory
+        theory = self.waves_of_impact
         trace = history["free_surface_speed"]
         t = history["t"]
         p = history["contact_pressure"]
         parted = history["contacts_opened"] > 0
         # a contact that a step has made was there at its start
         made = history["contacts_made"][1:] > self.touching
-        impact = find_time(history, np.append(made, False))
+        impact = run.find_time(np.append(made, False))
         until = impact + 0.7 * min(theory.back, theory.returned)
         pressure = reduce_between(np.median, t, p, impact, until, 4)
         out, free, end = theory.read_trace(t, trace)
@@ -248,10 +251,10 @@ class FlyerTarget(Problem):
         plate = f"{first.material} of {1e3 * first.thickness:g} mm at {deck.speed:g} m/s"
         if self.is_pair and self.are_fluids:
             notes.append(f"behind the impact both plates move at {theory.u:.5g} m/s")
-        for name in self.names if history else ():
+        for name in self.names if run.begun else ():
             notes.append(f"{name} moves at {history[f'speed_{name}'][-1]:.5g} m/s at the end")
         if parted.any():
-            notes.append(f"plates first separated at t = {find_time(history, parted):.4g} s")
+            notes.append(f"plates first separated at t = {run.find_time(parted):.4g} s")
         return Report(f"flyer-target: {plate}, {len(deck.plates)} plates", rows, notes)
 
     def compare_window(self, history) -> list[Row]:
@@ -276,7 +279,7 @@ class FlyerTarget(Problem):
     def draw_flyer_target(self, figure, run_data) -> None:
         """The speed of the surface that is observed beside theory or what was measured."""
         axis = figure.subplots()
-        theory = self.theory
+        theory = self.waves_of_impact
         words = "window's face" if self.has_window else "free surface of the last plate"
         labels = {self.observed: "computed"}
         draw_columns(axis, run_data.history, labels, f"{words} [m/s]", "µs")

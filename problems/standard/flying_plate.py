@@ -37,14 +37,10 @@ from shockgrid.problems.measured_traces import (
     interpolate,
 )
 from shockgrid.problems.pictures import make_panels
-from shockgrid.problems.problem import (
-    BlockPlan,
-    Problem,
-    Report,
-    Row,
-    find_crossing,
-)
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.elastic_plastic import compute_piston
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import find_crossing
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -207,7 +203,8 @@ class FlyingPlate(Problem):
         defaults = FlyingPlateDeck()
         return all(getattr(self.deck, name) == getattr(defaults, name) for name in SHAPING_KEYS)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         deck = self.deck
         t = history["t"]
         rows = []

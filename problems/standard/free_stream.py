@@ -23,7 +23,8 @@ from shockgrid.hydro.eos.materials import find_material
 from shockgrid.hydro.links import join
 from shockgrid.problems.deck import MOST_CELLS, Deck, RunControl, key
 from shockgrid.problems.initial_states import make_plane_grid
-from shockgrid.problems.problem import Problem, Report, Row, find_most
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.report import Report, Row
 
 # of the line between the blocks and of its neighbours, over the height of the domain
 LINE_BEND_PART = 0.1
@@ -109,10 +110,10 @@ class FreeStream(Problem):
         off = np.abs(block.state[:, 1:-1, 1:-1] - exact).max(axis=(1, 2))
         return float((off / (density, c, c, stiffness)).max())
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        label = f"largest deviation, {history['deviation'].size - 1} steps"
-        most = find_most(history, "deviation")
+        label = f"largest deviation, {run.history['deviation'].size - 1} steps"
+        most = run.most("deviation")
         row = Row("largest_deviation", most, label=label, digits=3)
         head = (
             f"uniform stream, Mach {deck.mach:g}, {' | '.join(deck.materials)}, {deck.contact}, "

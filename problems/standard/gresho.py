@@ -19,8 +19,9 @@ from shockgrid.hydro.links import join
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.initial_states import swing_square
 from shockgrid.problems.pictures import Colours, draw_field, make_panels
-from shockgrid.problems.problem import Problem, Report, Row, compare
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.exact_flows import GAUSS, average_points
+from shockgrid.problems.report import Report, Row
 
 CORE_TURN_TIME = 0.4 * math.pi  # of the core [s]
 KINETIC_ENERGY = 8.0 * math.pi / 300.0
@@ -73,15 +74,15 @@ class Gresho(Problem):
         energy = (0.5 * rho * (u * u + v * v) * block.volume).sum()
         return {"kinetic_energy": float(energy), "error_velocity": float(error)}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        energy = history["kinetic_energy"]
+        energy = run.history["kinetic_energy"]
         lost = 1.0 - float(energy[-1] / energy[0])
-        turns = f", {history['t'][-1] / CORE_TURN_TIME:.3g} turns" if history else ""
+        turns = f", {run.t / CORE_TURN_TIME:.3g} turns" if run.begun else ""
         rows = [
-            compare(history, "kinetic_energy", KINETIC_ENERGY, "kinetic energy [J/m]", digits=7),
+            run.compare("kinetic_energy", KINETIC_ENERGY, "kinetic energy [J/m]", digits=7),
             Row("lost", lost, label="part lost since the start", digits=3, error="lost"),
-            compare(history, "error_velocity", 0.0, "mean error of the velocity", digits=3),
+            run.compare("error_velocity", 0.0, "mean error of the velocity", digits=3),
         ]
         head = f"gresho, {deck.cells} x {deck.cells}, grid {deck.mesh}{turns}"
         return Report(head, rows, ["bar: 2 % lost after one turn at 40 x 40"])

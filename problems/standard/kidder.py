@@ -23,8 +23,8 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem
 from shockgrid.problems.pictures import Colours, draw_field, make_panels
-from shockgrid.problems.problem import Report, compare, get_last
 from shockgrid.problems.references.exact_flows import RADII, Shell
+from shockgrid.problems.report import Report
 from shockgrid.regrid.measure.corners import compute_centres
 
 END = math.sqrt(0.75)  # of tau: h is one half
@@ -92,16 +92,16 @@ class Kidder(RadialProblem):
         error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
         return {**row, "error_rho": float(np.average(error, weights=block.volume))}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        h = self.shell.compute_shrinking(get_last(history, "t")) if history else 0.5
+        h = self.shell.compute_shrinking(run.t) if run.begun else 0.5
         kinds = {"error": "relative error", "worst": "at the worst ray", "roundness": "round to"}
         labels = {
             f"{side}_{kind}": f"{side} radius, {label}"
             for side in ("inner", "outer")
             for kind, label in kinds.items()
         } | {"error_rho": "mean error of the density"}
-        rows = [compare(history, name, label=label, digits=3) for name, label in labels.items()]
+        rows = [run.compare(name, label=label, digits=3) for name, label in labels.items()]
         head = f"kidder, {SHAPES[deck.n]} of {deck.cells} x {deck.rays} cells: shrunk to {h:.4g}"
         return Report(f"{head} of the first radii", rows)
 

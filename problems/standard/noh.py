@@ -20,8 +20,8 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem, Symmetry
-from shockgrid.problems.problem import Report, Row, compare, get_last
 from shockgrid.problems.references.exact_flows import DIMENSIONS
+from shockgrid.problems.report import Report, Row
 from shockgrid.regrid.measure.corners import compute_centres
 
 
@@ -104,22 +104,22 @@ class Noh(RadialProblem):
                 row[name] = float(np.average(cells, weights=weight))
         return {**row, "error_rho": self.measure_error(evolution, 2.0 * shock)}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        t = get_last(history, "t") if history else self.t_end
+        t = run.t
         behind = float(self.compute_density(np.zeros(1), max(t, 1e-9))[0])
         reach = self.shock_speed * t
         p = self.shock_speed * behind
         label = f"relative error of the density, r < {2 * reach:.3g}"
         grid = f"grid shrinking at {deck.shrink:g} a second" if deck.shrink else "fixed grid"
         rows = [
-            compare(history, "density_behind", behind, "density behind the shock"),
-            compare(history, "pressure_behind", p, "pressure behind it"),
+            run.compare("density_behind", behind, "density behind the shock"),
+            run.compare("pressure_behind", p, "pressure behind it"),
             Row("shock_radius", theory=reach),
-            compare(history, "error_rho", label=label),
+            run.compare("error_rho", label=label),
         ]
         head = f"noh, {deck.geometry}, {deck.cells} cells per side, {grid}"
-        return Report(head, rows, self.list_notes(history))
+        return Report(head, rows, self.list_notes(run))
 
     def draw_noh(self, figure, run_data) -> None:
         """Density in the last dump out to twice the shock's radius, and against the radius."""

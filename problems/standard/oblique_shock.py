@@ -20,13 +20,15 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.pictures import draw_field, make_panels
-from shockgrid.problems.problem import Problem, Report, compare, find_crossing, fit_slope
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.shock_polars import (
     Body,
     ShockPolar,
     search_pressure,
     solve_collision,
 )
+from shockgrid.problems.report import Report
+from shockgrid.problems.signals import find_crossing, fit_slope
 
 # length before the wedge; it is 1 long, and the top is 1 above its start
 LAST_TIME_PART = 0.1  # of the time: in it a steady flow does not change
@@ -110,13 +112,13 @@ class ObliqueShock(Problem):
         ratio = float(p[x > 0.5, 0].mean()) / self.pressure
         return {"wall_pressure_ratio": ratio, "shock_angle": slope, "shock_angle_error": off}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
         beta = math.degrees(self.beta)
         labels = "angle of the shock [degrees]", "pressure on the wall over exact"
         notes = [f"exact pressure: {self.pressure / self.ahead:.5g} of the stream's"]
         more = {}
-        change = self.measure_change(history)
+        change = self.measure_change(run.history)
         if change > STEADY_CHANGE:
             more = {"off": "--", "source": "not steady yet"}
             notes.append(
@@ -124,8 +126,8 @@ class ObliqueShock(Problem):
                 f"{100.0 * change:.2g} %: theory is of the steady flow, which a later run.t_end has"
             )
         rows = [
-            compare(history, "shock_angle", beta, labels[0], error="angle", **more),
-            compare(history, "wall_pressure_ratio", 1.0, labels[1], error="pressure", **more),
+            run.compare("shock_angle", beta, labels[0], error="angle", **more),
+            run.compare("wall_pressure_ratio", 1.0, labels[1], error="pressure", **more),
         ]
         head = f"oblique-shock, Mach {deck.mach:g} on {deck.angle:g} degrees, {deck.cells} cells"
         return Report(head, rows, notes)

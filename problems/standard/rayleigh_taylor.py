@@ -27,17 +27,10 @@ from shockgrid.hydro.sources import make_gravity
 from shockgrid.problems.deck import MOST_CELLS, Deck, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import draw_columns
-from shockgrid.problems.problem import (
-    Problem,
-    Report,
-    Row,
-    compare,
-    find_frequency,
-    find_growth_rate,
-    find_time,
-    keep_until,
-)
+from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.exact_flows import compute_gravity_mode, compute_isentropic_layer
+from shockgrid.problems.report import Report, Row, RunSoFar
+from shockgrid.problems.signals import find_frequency, find_growth_rate
 from shockgrid.regrid.measure.corners import compute_centres
 
 GAS_GAMMA = 5.0 / 3.0
@@ -117,26 +110,26 @@ class RayleighTaylor(Problem):
         amplitude = ((height - mean) * wave * steps).sum() / (wave * wave * steps).sum()
         return {"amplitude": float(amplitude), "interface_mean": mean}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         find = find_growth_rate if self.grows else find_frequency
-        linear = keep_until(history, self.find_linear_end(history))
+        linear = run.until(self.find_linear_end(run)).history
         rate = find(linear["t"], linear["amplitude"])
         notes = []
-        if len(linear["t"]) < len(history["t"]):
+        if len(linear["t"]) < len(run.history["t"]):
             until = f"k a = {STEEPEST_LINEAR_KA:g} at t = {linear['t'][-1]:.4g}"
             notes.append(f"linear theory ends at {until}: the rate is that up to there")
         label = "growth rate [1/s]" if self.grows else "angular frequency [1/s]"
-        mean = history["interface_mean"]
+        mean = run.history["interface_mean"]
         head = f"rayleigh-taylor, {self.deck.above} above, {self.deck.cells} cells per wavelength"
         row = Row("rate", rate, self.exact, label, digits=7, error="rate")
-        rows = [row, compare(history, "amplitude", label="last amplitude", digits=4)]
+        rows = [row, run.compare("amplitude", label="last amplitude", digits=4)]
         moved = f"the mean has moved by at most {np.abs(mean - mean[0]).max():.1e} m"
         return Report(head, rows, ["theory is without compression", *notes, moved])
 
-    def find_linear_end(self, history) -> float:
+    def find_linear_end(self, run: RunSoFar) -> float:
         """The last time [s] before the wave is steeper than STEEPEST_LINEAR_KA."""
-        steep = WAVE_NUMBER * np.abs(history["amplitude"]) > STEEPEST_LINEAR_KA
-        first = find_time(history, steep)
+        steep = WAVE_NUMBER * np.abs(run.history["amplitude"]) > STEEPEST_LINEAR_KA
+        first = run.find_time(steep)
         return math.inf if math.isnan(first) else math.nextafter(first, -math.inf)
 
     def draw_growth(self, figure, run_data) -> None:

@@ -33,8 +33,9 @@ from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import BlockPlan, Problem, Report, Row
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.elastic_plastic import compute_piston, compute_release
+from shockgrid.problems.report import Report, Row
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -211,7 +212,8 @@ class RippledSurface(Problem):
         left = arrival + (self.amplitude + AFTER_PASSAGE_PART * self.deck.wavelength) / speed
         return min(int(np.searchsorted(history["t"], left)), len(history["t"]) - 1)
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         deck = self.deck
         first = self.find_first_row(history)
         sense = -1.0 if deck.start == "shock" else 1.0

@@ -25,7 +25,8 @@ from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import draw_field, find_dump
-from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_most
+from shockgrid.problems.problem import BlockPlan, Problem
+from shockgrid.problems.report import Report, Row
 
 # times at which a shock starts and ends, its first place, its speed, density behind it
 PHASES = (
@@ -96,7 +97,8 @@ class Saltzmann(Problem):
             row[f"{kind}_error_{phase + 1}"] = float(size)
         return row
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         deck = self.deck
         rows = []
         for n, (*_, exact) in enumerate(PHASES, 1):
@@ -106,7 +108,7 @@ class Saltzmann(Problem):
                     name = f"{kind}_error_{n}"
                     label = f"{when}: {error} [%]"
                     rows.append(Row(name, history[name][last], label=label, unit=0.01, digits=3))
-        most = find_most(history, "transverse_speed")
+        most = run.most("transverse_speed")
         rows.append(Row("largest_transverse_speed", most, label="largest speed across", digits=2))
         head = f"saltzmann, {deck.cells} x {deck.rows} cells, {deck.regrid.name}"
         return Report(f"{head}; errors of the density behind each shock:", rows)

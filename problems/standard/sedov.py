@@ -22,8 +22,8 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.formulas.geometry import compute_volumes, find_geometry
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem, Symmetry, follow_gas
-from shockgrid.problems.problem import Report, Row, compare, get_last
 from shockgrid.problems.references.exact_flows import DIMENSIONS, SedovBlast
+from shockgrid.problems.report import Report, Row
 
 # of the whole energy in the part that is computed: half a line, a quarter, a quarter a radian
 SHARES = {"plane": 0.5, "cylindrical": 0.25, "spherical": 0.25 / math.pi}
@@ -92,21 +92,21 @@ class Sedov(RadialProblem):
         found = {"shock_radius": self.find_shock(block), "most_density": most}
         return {**found, "error_rho": self.measure_error(evolution)}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        energy = history["total_energy"]
-        t = get_last(history, "t") if history else self.t_end
+        energy = run.history["total_energy"]
+        t = run.t
         jump = (deck.gamma + 1.0) / (deck.gamma - 1.0)
         change = float(np.abs(energy / energy[0] - 1.0).max())
         rows = [
-            compare(history, "shock_radius", self.blast.radius(t), "radius of the shock"),
-            compare(history, "most_density", jump, "greatest density"),
+            run.compare("shock_radius", self.blast.radius(t), "radius of the shock"),
+            run.compare("most_density", jump, "greatest density"),
             Row("energy", change, label="relative change of the energy", error="energy", digits=2),
-            compare(history, "error_rho", label="relative error of the density", digits=4),
+            run.compare("error_rho", label="relative error of the density", digits=4),
         ]
         grid = "nodes follow the gas" if self.mesh == "follow" else "fixed grid"
         head = f"sedov, {deck.geometry}, {deck.cells} cells per side, {grid}"
-        return Report(head, rows, self.list_notes(history))
+        return Report(head, rows, self.list_notes(run))
 
     def draw_sedov(self, figure, run_data) -> None:
         """Density in the last dump with the grid, and against the radius."""

@@ -26,8 +26,8 @@ from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import RadialProblem
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import Report, Row, get_last
 from shockgrid.problems.references.collapsing_shells import PlasticShell
+from shockgrid.problems.report import Report, Row
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -146,12 +146,12 @@ class CollapsingShell(RadialProblem):
         energy = 0.5 * mass * (fields["u"] ** 2 + fields["v"] ** 2)
         return {**row, "kinetic_energy": float(energy.sum())}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        inner = history["inner_radius"]
+        inner = run.history["inner_radius"]
         least = float(np.nanmin(inner)) if np.isfinite(inner).any() else math.nan
         passed = len(inner) > 1 and np.nanargmin(inner) < len(inner) - 1
-        outer = history["outer_radius"]
+        outer = run.history["outer_radius"]
         at_stop = float(outer[np.nanargmin(inner)]) if math.isfinite(least) else math.nan
         rows = [
             Row("stop", least, self.stop, "inner radius at the stop [mm]", ONE_MILLIMETRE, 6),
@@ -165,7 +165,7 @@ class CollapsingShell(RadialProblem):
             ),
             Row(
                 "inner_roundness",
-                get_last(history, "inner_roundness"),
+                run.last("inner_roundness"),
                 label="inner surface, round to",
                 digits=2,
             ),

@@ -29,7 +29,8 @@ from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER
 from shockgrid.problems.deck import MOST_CELLS, DeckTable, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, find_most, get_last
+from shockgrid.problems.problem import BlockPlan, Problem
+from shockgrid.problems.report import Report, Row
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -142,10 +143,10 @@ class TaylorBar(Problem):
         load = self.material.rho0 * deck.speed**2 / (2.0 * flow_stress)
         return deck.length * (LENGTH_LEFT_PART + (1.0 - LENGTH_LEFT_PART) * math.exp(-load))
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
         known = deck.known
-        length = get_last(history, "length")
+        length = run.last("length")
         rows = [
             Row(
                 "length",
@@ -158,7 +159,7 @@ class TaylorBar(Problem):
             ),
             Row(
                 "foot_diameter",
-                get_last(history, "foot_diameter"),
+                run.last("foot_diameter"),
                 use(known.diameter),
                 "diameter of the foot [mm]",
                 ONE_MILLIMETRE,
@@ -167,7 +168,7 @@ class TaylorBar(Problem):
             ),
             Row(
                 "most_plastic_strain",
-                find_most(history, "most_plastic_strain"),
+                run.most("most_plastic_strain"),
                 use(known.plastic_strain),
                 "greatest plastic strain",
                 digits=4,
@@ -182,7 +183,7 @@ class TaylorBar(Problem):
                 source="exponential estimate",
             ),
         ]
-        energy = history["kinetic_energy"]
+        energy = run.history["kinetic_energy"]
         left = float(energy[-1] / energy[0])
         notes = [f"kinetic energy left at the end: {100.0 * left:.3g} %"]
         size = f"{1e3 * deck.length:g} mm x {1e3 * deck.diameter:g} mm"

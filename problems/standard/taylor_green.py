@@ -21,7 +21,7 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import BlockPlan, Problem, Report, compare
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.exact_flows import (
     CELL_GAMMA,
     compute_cell,
@@ -29,6 +29,7 @@ from shockgrid.problems.references.exact_flows import (
     follow_cell,
     heat_cell,
 )
+from shockgrid.problems.report import Report
 from shockgrid.regrid.measure.corners import compute_centres
 
 SWING_PERIOD = 0.6  # of the swinging grid [s]: at t = 0.75 it is as far as it goes
@@ -73,12 +74,12 @@ class TaylorGreen(Problem):
         errors = {"error_velocity": np.hypot(u_cell - u, v_cell - v), "error_p": np.abs(p_cell - p)}
         return {name: float((e * block.volume).sum()) for name, e in errors.items()}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         n = self.deck.cells
-        t = f", t = {history['t'][-1]:.3g}" if history else ""
+        t = f", t = {run.t:.3g}" if run.begun else ""
         fields = {"error_velocity": "the velocity", "error_p": "the pressure"}
         rows = [
-            compare(history, name, label=f"mean error of {field}", digits=3)
+            run.compare(name, label=f"mean error of {field}", digits=3)
             for name, field in fields.items()
         ]
         return Report(f"taylor-green, {n} x {n}, grid {self.deck.mesh}{t}", rows)

@@ -23,8 +23,10 @@ from shockgrid.hydro.links import join
 from shockgrid.hydro.motion.line import LineRule
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
-from shockgrid.problems.problem import BlockPlan, Problem, Report, Row, average_plateau, get_last
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.riemann import solve_riemann
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import average_plateau
 
 # equation of state; density, velocity, pressure; lower left and upper right corner
 GASES = {
@@ -97,7 +99,8 @@ class TriplePoint(Problem):
                     row[f"{q}_{name}_{side}"] = float(mean) if known else math.nan
         return row
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
+        history = run.history
         # exact states beside the left contact at the walls, by columns
         stars = {}
         rows = []
@@ -119,6 +122,6 @@ class TriplePoint(Problem):
         head = f"triple-point, {self.deck.cells} cells in a length of 1"
         if last is not None:
             head += f"; states beside the left contact at the walls, t = {history['t'][last]:.3f}"
-        x, y = get_last(history, "point_x"), get_last(history, "point_y")
-        where = f"t = {get_last(history, 't'):.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
+        x, y = run.last("point_x"), run.last("point_y")
+        where = f"t = {run.last('t'):.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
         return Report(head, rows, [where])

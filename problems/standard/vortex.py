@@ -19,8 +19,9 @@ from shockgrid.hydro.links import join
 from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, RunControl, key
 from shockgrid.problems.initial_states import swing_square
 from shockgrid.problems.pictures import Colours, draw_field
-from shockgrid.problems.problem import BlockPlan, Problem, Report, compare, get_last, say_unreached
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.exact_flows import Vortex as ExactVortex
+from shockgrid.problems.report import Report
 
 # mean |rho - exact| at t = 10, beta 5, on a fixed grid; computed independently
 FIXED_GRID_ERRORS = {32: 6.73e-3, 64: 1.60e-3, 128: 3.66e-4, 256: 8.85e-5}
@@ -73,11 +74,11 @@ class Vortex(Problem):
         error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
         return {"error_rho": float(np.average(error, weights=block.volume))}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
-        error = get_last(history, "error_rho")
-        rows = [compare(history, "error_rho", label="mean error of the density", digits=3)]
-        notes = say_unreached(history, "error_rho")
+        error = run.last("error_rho")
+        rows = [run.compare("error_rho", label="mean error of the density", digits=3)]
+        notes = run.say_unreached("error_rho")
         known = FIXED_GRID_ERRORS.get(deck.cells)
         if known and not notes and deck.beta == 5.0 and deck.run.t_end == 10.0:
             notes = [f"{error / known:.2f} of the reference on a fixed grid, {known:.3g}"]

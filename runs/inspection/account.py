@@ -193,7 +193,7 @@ def describe_cautions(problem: Problem, history: History | None = None) -> list[
     """
     known_history = history if history and len(history.get("step", ())) > 1 else None
     try:
-        sentences = problem.cautions(known_history)
+        sentences = problem.cautions_on(known_history)
     except RunFailure as error:
         sentences = [f"cautions could not be computed: {error}"]
     return [HEAD + drop_units(one, problem.t_unit) for one in dict.fromkeys(sentences)]

@@ -19,8 +19,8 @@ import numpy as np
 
 from shockgrid.hydro.remap.conserved import check_convex, remap_means
 from shockgrid.hydro.remap.overlay import compute_cell_moments
-from shockgrid.problems.problem import align
 from shockgrid.problems.problem_file import is_problem_file
+from shockgrid.problems.report import align
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.deck.checking import find_differences as find_changed_keys
 from shockgrid.runs.deck.checking import show
@@ -102,7 +102,7 @@ def describe_runs(a: RunData, b: RunData) -> list[str]:
     """A table of the settings and results that differ between two runs of one problem."""
     try:
         rows = [(x.key, show(x.before), show(x.now)) for x in find_changed_keys(a.deck, b.deck)]
-        results = [run.problem.report(run.history).rows for run in (a, b)]
+        results = [run.problem.report_on(run.history).rows for run in (a, b)]
         files = [run.read_deck.file for run in (a, b)]
     except BadInput:  # a deck of another version
         return []

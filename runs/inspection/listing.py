@@ -8,7 +8,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from shockgrid.problems.problem import check_memory
 from shockgrid.problems.problem_file import is_problem_file
 from shockgrid.problems.registry import INSTALLED, PROBLEMS, SUBJECTS, read_docstring, summary_line
 from shockgrid.problems.registry import OWN as OWN_PROBLEMS
@@ -206,7 +205,7 @@ def describe_plan(deck: ReadDeck) -> str:
         problem = deck.make_problem()
         plan = problem.plan()
         if plan is None:
-            check_memory(problem)  # it is built to be looked at
+            problem.check_memory()  # it is built to be looked at
         evolution = problem.build() if plan is None else None
     if evolution is not None:
         t_end = evolution.t_end

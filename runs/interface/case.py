@@ -30,7 +30,7 @@ from shockgrid.problems.evolution import (
     get_node_fields,
     is_axisymmetric,
 )
-from shockgrid.problems.problem import Problem, check_memory
+from shockgrid.problems.problem import Problem
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.runs.deck.reading import ReadDeck, read_deck, resolve_deck
 from shockgrid.runs.interface.wording import said_in_python
@@ -346,12 +346,12 @@ class Case(Drawn):
     @property
     def theory(self) -> dict[str, float]:
         """The problem's reference values for this deck, by name, in SI units; {} if none."""
-        return self.problem.predict()
+        return self.problem.theory()
 
     @property
     def cautions(self) -> list[str]:
         """Sentences that say where results of this deck may be wrong."""
-        return self.problem.cautions()
+        return self.problem.cautions_on()
 
     @cached_property
     def simulation(self) -> Evolution:
@@ -360,7 +360,7 @@ class Case(Drawn):
         It is made at its first use.  Changes to it change the run.
         """
         with said_in_python(), self.read.numbers_in_reach():
-            check_memory(self.problem)
+            self.problem.check_memory()
             return self.problem.build()
 
     @property

@@ -19,7 +19,7 @@ from shockgrid.hydro.simulation import Simulation
 from shockgrid.problems.column_groups import find_columns
 from shockgrid.problems.deck import Deck, Output, Regrid
 from shockgrid.problems.evolution import Evolution, get_node_fields
-from shockgrid.problems.problem import Problem, check_memory
+from shockgrid.problems.problem import Problem
 from shockgrid.regrid.compilation.first_calls import interpreted
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.runs.deck.checking import find_differences, is_runtime_key, list_runtime_keys, show
@@ -118,7 +118,7 @@ def start_runner(
     """
     problem = built[0] if built else deck.make_problem()
     with compiling(quiet), deck.numbers_in_reach():
-        check_memory(problem)
+        problem.check_memory()
         cautions = describe_cautions(problem)
         check_regridder(problem)
         if world is not None:
@@ -328,5 +328,5 @@ def _build(deck: ReadDeck, quiet: bool) -> Evolution:
     """The first state of a deck's problem."""
     problem = deck.make_problem()
     with compiling(quiet), deck.numbers_in_reach():
-        check_memory(problem)
+        problem.check_memory()
         return problem.build()

@@ -8,7 +8,7 @@ from shockgrid.hydro.interior.advance import TILE_ROWS
 from shockgrid.hydro.ranks.cutting import Distribution, distribute_blocks, sum_cells
 from shockgrid.hydro.ranks.messages import CELLS_DEEP
 from shockgrid.hydro.simulation import Simulation
-from shockgrid.problems.problem import estimate_memory
+from shockgrid.problems.memory import estimate_memory
 from shockgrid.regrid.errors import BadInput, suggest
 
 

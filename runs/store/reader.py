@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.problems.problem import Problem, align
+from shockgrid.problems.problem import Problem
+from shockgrid.problems.report import align
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.measure.corners import compute_centres
 from shockgrid.runs.deck.reading import ReadDeck, read_toml
@@ -424,7 +425,7 @@ class RunData:
     @property
     def theory(self) -> dict[str, float]:
         """What the problem's references say for the deck, by name, SI units; {} for nothing."""
-        return self.problem.predict()
+        return self.problem.theory()
 
     @property
     def summary(self) -> str:

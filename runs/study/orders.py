@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shockgrid.problems.problem import align
+from shockgrid.problems.report import align
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.roots import find_root
 from shockgrid.runs.study.computing import Result, find_names

@@ -42,7 +42,7 @@ def test_an_example_runs_to_its_end(name, tmp_path):
     assert "Traceback" not in done.stderr
     if name == "gun.py":
         run = sg.open(tmp_path / "out/run")
-        (row,) = run.problem.report(run.history).rows
+        (row,) = run.problem.report_on(run.history).rows
         assert row.find_error() < 2e-3
 
 

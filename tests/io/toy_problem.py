@@ -170,11 +170,11 @@ class Toy(Problem):
     def summary(self, history, final):
         return f"hottest at the end: {history['hottest'][-1]:.4f}, theory 1.5"
 
-    def cautions(self, history=None):
+    def cautions(self, run):
         if self.deck.density <= 10.0:
             return []
         told = [f"density {self.deck.density:g} was never tried; take 10 or less"]
-        return told + (["it was hot"] if history is not None else [])
+        return told + (["it was hot"] if run.begun else [])
 
     def figures(self):
         return {"cooling": draw_cooling}

@@ -90,7 +90,7 @@ def sweep_flat_line(deck: InterfaceDeck, parts: int = 10) -> FlatLine:
         second_shock=None,
     )
     farthest = InterfaceInstability(deck)
-    base = farthest.theory.base
+    base = farthest.linear_growth.base
     shock = farthest.shock
     since = AWAY * deck.wavelength / (base.right_wave.head - base.u)
     t_end = farthest.arrival + since

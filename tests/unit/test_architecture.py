@@ -58,6 +58,8 @@ ROOMS = (
     ("hydro.remap",),
     ("problems.prefixes",),
     ("problems.deck", "problems.evolution", "problems.pictures"),
+    ("problems.signals", "problems.memory"),
+    ("problems.report",),
     ("problems.problem",),
     ("problems.problem_file", "problems.own_simulation"),
     ("problems.column_groups",),

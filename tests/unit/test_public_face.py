@@ -39,7 +39,7 @@ AlgebraicRegridder BadInput BarrierRegridder Block CarriedField Case Deck DeckTa
 EquationOfState Hook IdealGas JWL MieGruneisen OpenRun Output PhaseTransition Problem Regrid
 RegridFailure Report Row RunControl RunFailure Segment Simulation StiffenedGas StrengthLaw Study
 Tabular
-__version__ compare compare_column draw_field film find_material gravity grid inlined inspect join
+__version__ compare draw_field film find_material gravity grid inlined inspect join
 key load make_plane_grid make_regridder open plot put put_walls register report restart run shock
 slide study testing transfinite_grid verify
 """

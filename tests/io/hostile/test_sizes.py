@@ -6,7 +6,7 @@ import tracemalloc
 
 import pytest
 
-from shockgrid.problems import problem as size
+from shockgrid.problems import memory as size
 from shockgrid.problems.registry import OWN, load_problem
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.deck.checking import make_parts, resolve
@@ -101,7 +101,7 @@ def test_what_memory_does_not_hold_is_said_at_once(small_machine, name, settings
     try:
         with pytest.raises(BadInput, match=r"where .* GB are there; take fewer cells, at most"):
             describe_plan(deck)  # says the size where a plan is arithmetic; a run refuses it
-            size.check_memory(deck.make_problem())
+            deck.make_problem().check_memory()
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:
         tracemalloc.stop()
@@ -112,6 +112,6 @@ def test_the_matrices_of_a_convecting_box_count(monkeypatch):
     monkeypatch.setattr(size, "find_memory", lambda: 24e9)
     deck = resolve_deck({"problem": "heated-cavity"}, "deck", ("cells=1798", "aspect=2"))
     with pytest.raises(BadInput, match=r"where 24 GB are there; take fewer cells"):
-        size.check_memory(deck.make_problem())
+        deck.make_problem().check_memory()
     deck = resolve_deck({"problem": "heated-cavity"}, "deck", ("cells=400",))
-    size.check_memory(deck.make_problem())
+    deck.make_problem().check_memory()

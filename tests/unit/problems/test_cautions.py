@@ -88,12 +88,12 @@ USUAL = {
 @pytest.mark.parametrize("name", STRANGE)
 def test_what_is_hardly_meant(name):
     make, words = STRANGE[name]
-    assert re.search(words, "\n".join(make().cautions()))
+    assert re.search(words, "\n".join(make().cautions_on()))
 
 
 @pytest.mark.parametrize("name", USUAL)
 def test_usual_decks(name):
-    assert USUAL[name]().cautions() == []
+    assert USUAL[name]().cautions_on() == []
 
 
 @pytest.mark.parametrize(
@@ -104,11 +104,11 @@ def test_a_wave_that_rolls_up_slowly(mach, limiter, told):
     """At the speed of linear theory, k a0 = 0.5."""
     problem = make_interface(mach=mach, modes=[Mode(ka0=0.5)], limiter=limiter)
     start = 0.5 / problem.k
-    speed = abs(problem.theory.get_asymptotic_rate()) * problem.k * start
+    speed = abs(problem.linear_growth.get_asymptotic_rate()) * problem.k * start
     t = np.linspace(0.0, 0.4 / speed, 50)
     history = {"t": t, "amplitude": start + speed * t}
     history["amplitude_mode_1"] = history["amplitude"]
-    found = [one for one in problem.cautions(history) if "slow vort" in one]
+    found = [one for one in problem.cautions_on(history) if "slow vort" in one]
     assert len(found) == told
 
 
@@ -118,6 +118,6 @@ def test_a_mushroom_on_few_cells(cells, told):
     t = np.linspace(0.0, problem.t_end, 50)
     history = {"t": t, "amplitude": np.linspace(0.03, 0.5, 50)}
     history["amplitude_mode_1"] = history["amplitude"]
-    found = [one for one in problem.cautions(history) if "mushroom" in one]
+    found = [one for one in problem.cautions_on(history) if "mushroom" in one]
     assert len(found) == told
     assert all("24 along the line" in one for one in found)

@@ -42,7 +42,7 @@ def make_problem(*modes, **deck):
 
 def make_history(problem, factor=1.0, end=30.0):
     """The history of a run whose modes grow `factor` times as fast as linear theory says."""
-    theory = problem.theory
+    theory = problem.linear_growth
     kct = np.linspace(-1.0, end, 4001)
     after = np.maximum(kct, 0.0)
     history = {
@@ -174,7 +174,7 @@ def make_from_points(folder, points, **keys):
 def test_a_spline_that_leaves_its_points_is_a_caution(tmp_path, points, told):
     y = np.linspace(0.0, 1.0, points)
     line = TOOTH if points == 6 else np.array([0.1 * np.cos(2.0 * np.pi * y), y])
-    cautions = make_from_points(tmp_path, line).cautions()
+    cautions = make_from_points(tmp_path, line).cautions_on()
     assert told == any("spline through its 6 points goes" in words for words in cautions)
 
 
@@ -185,7 +185,7 @@ def test_a_straight_line_from_point_to_point_stays_between_them(tmp_path, cells)
     x = problem.shape(y)
     assert np.ptp(x) == pytest.approx(0.2, rel=1e-12)
     assert x - x[0] == pytest.approx(np.interp(y, TOOTH[1], TOOTH[0]) + 0.1, abs=1e-12)
-    assert not any("line_file" in words for words in problem.cautions())
+    assert not any("line_file" in words for words in problem.cautions_on())
 
 
 def test_two_points_are_enough_for_a_straight_line_alone(tmp_path):

@@ -133,7 +133,7 @@ def test_each_mode_of_a_small_spectrum_grows_as_theory_says():
     fine = [mode for mode in problem.harmonics if problem.deck.cells >= 32 * mode.number]
     assert len(fine) == 2
     for mode in fine:
-        expected = mode.amplitude * predict_amplitude(problem.theory, mode.number * kct)
+        expected = mode.amplitude * predict_amplitude(problem.linear_growth, mode.number * kct)
         assert row[mode.column] == pytest.approx(float(expected), rel=TRUSTED_RATE_ERROR)
 
 
@@ -188,7 +188,7 @@ def test_the_line_has_the_amplitudes_of_linear_theory(name):
     problem = make_of_start(name)
     line = problem.build().blocks[0].nodes[:, -1]
     for mode in problem.harmonics:
-        grown = problem.theory.get_amplitude(mode.number * problem.k, -problem.arrival)
+        grown = problem.linear_growth.get_amplitude(mode.number * problem.k, -problem.arrival)
         found = measure_mode(line, problem.k, mode.number, mode.phase)
         assert found == pytest.approx(mode.amplitude * grown, rel=1e-3)
 
@@ -203,7 +203,7 @@ def find_layer(cells: int, numbers=(1,), **deck) -> float:
     """Way to the nearer front at the start over the shortest wave of the line."""
     modes = [Mode(number=number, ka0=0.01) for number in numbers]
     problem = make_of_start(cells=cells, kct_end=30.0, modes=modes, **deck)
-    way = -problem.arrival * find_nearer_speed(problem.theory.base)
+    way = -problem.arrival * find_nearer_speed(problem.linear_growth.base)
     return way / problem.deck.wavelength * max(numbers)
 
 

@@ -9,7 +9,6 @@ from scipy import integrate
 from shockgrid.hydro.eos import JWL, IdealGas, MieGruneisen, StiffenedGas
 from shockgrid.hydro.eos.materials import find_material
 from shockgrid.problems.initial_states import mix_states
-from shockgrid.problems.problem import Row
 from shockgrid.problems.references.exact_flows import SedovBlast, Vortex, compute_taylor_wave
 from shockgrid.problems.references.hugoniot import (
     GeneralIsentrope,
@@ -20,6 +19,7 @@ from shockgrid.problems.references.hugoniot import (
     shock_with_speed,
 )
 from shockgrid.problems.references.riemann import compute_cell_averages, solve_riemann
+from shockgrid.problems.report import Row
 from shockgrid.regrid.errors import BadInput
 
 AIR = IdealGas(1.4)

@@ -62,7 +62,7 @@ def follow_flat_line(first: Fluid, second: Fluid, farther: float, **deck) -> tup
         way.append((flow.t, flow.blocks[0].nodes[0, -1, 0]))
     t, x = np.transpose(way)
     late = problem.arrival + np.linspace(0.5, 1.0, 101) * (t[-1] - problem.arrival)
-    speed = problem.theory.base.u
+    speed = problem.linear_growth.base.u
     offset = np.interp(late, t, x) - speed * (late - problem.arrival)
     drift = np.polyfit(late, offset, 1)[0]
     return CELLS * offset.mean(), drift / problem.shock.shock_speed
@@ -138,7 +138,7 @@ def run_flat(mach: float, ratio: float, cfl: float, kct: float) -> list[np.ndarr
     )
     problem = InterfaceInstability(deck)
     flow = problem.build()
-    base = problem.theory.base
+    base = problem.linear_growth.base
     while flow.finished is None:
         flow.advance()
     since = flow.t - problem.arrival
@@ -173,9 +173,9 @@ def measure_rate(cells: int, kct: float, **deck) -> tuple[float, float]:
         times.append(flow.t)
         heights.append(measure_mode(flow.blocks[0].nodes[:, -1], problem.k, 1, 0.0))
     ends = np.interp((6.0, kct), get_kct(problem, np.array(times)), heights)
-    duration = (kct - 6.0) / (problem.k * problem.theory.sound_speed)
+    duration = (kct - 6.0) / (problem.k * problem.linear_growth.sound_speed)
     rate = (ends[1] - ends[0]) / duration / (problem.k * problem.harmonics[0].amplitude)
-    return rate, problem.theory.get_mean_rate(6.0, kct)
+    return rate, problem.linear_growth.get_mean_rate(6.0, kct)
 
 
 @pytest.mark.parametrize(

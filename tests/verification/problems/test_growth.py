@@ -55,7 +55,7 @@ class Finished:
     def kct(self) -> np.ndarray:
         problem = self.problem
         times = self.history["t"] - problem.arrival
-        return times * problem.k * problem.theory.sound_speed
+        return times * problem.k * problem.linear_growth.sound_speed
 
     def measure_drift(self, name: str) -> float:
         """Largest change of a total that the boundary did not bring, over the total."""
@@ -88,7 +88,7 @@ def run_steep(**deck):
 def compute_error(run: Finished) -> float:
     """Relative difference of the mean growth rate from linear theory over the same window."""
     rate = measure_growth(run.problem, run.history)
-    return rate / run.problem.theory.get_mean_rate() - 1.0
+    return rate / run.problem.linear_growth.get_mean_rate() - 1.0
 
 
 def test_growth_at_32_cells():
@@ -97,7 +97,7 @@ def test_growth_at_32_cells():
     assert abs(compute_error(run)) < 0.04
     settled = run.kct > 3.0
     speed = np.polyfit(run.history["t"][settled], run.history["interface_mean"][settled], 1)[0]
-    assert speed == pytest.approx(run.problem.theory.base.u, rel=1e-3)
+    assert speed == pytest.approx(run.problem.linear_growth.base.u, rel=1e-3)
 
 
 @pytest.mark.parametrize("mach", [1.2, 1.5])
@@ -118,11 +118,11 @@ def measure_ripple(run: Finished, first=1.0, last=4.0, window=0.6) -> float:
     kct = np.linspace(first, last, 601)
     speed = np.gradient(run.history["amplitude_mode_1"], run.history["t"])
     rate = np.interp(kct, run.kct, speed) / (problem.k * problem.harmonics[0].amplitude)
-    off = rate - problem.theory.get_rate(1.0, kct / problem.theory.sound_speed)
+    off = rate - problem.linear_growth.get_rate(1.0, kct / problem.linear_growth.sound_speed)
     half = round(0.5 * window * 600 / (last - first))
     weights = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     mean = np.convolve(np.pad(off, half, mode="edge"), weights, "valid")
-    return np.sqrt(np.mean((off - mean) ** 2)) / abs(problem.theory.get_asymptotic_rate())
+    return np.sqrt(np.mean((off - mean) ** 2)) / abs(problem.linear_growth.get_asymptotic_rate())
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -152,7 +152,7 @@ def find_ratio_after_passage(ka0: float) -> float:
     )  # fmt: skip
     problem = InterfaceInstability(deck)
     evolution = problem.build()
-    end = problem.arrival + 1.0 / (problem.k * problem.theory.sound_speed)
+    end = problem.arrival + 1.0 / (problem.k * problem.linear_growth.sound_speed)
     before = problem.measure(evolution)["amplitude_mode_1"]
     while evolution.t < end:
         evolution.advance()
@@ -169,7 +169,7 @@ def compute_damping(run: Finished) -> float:
     """By how much the rate over theory's falls from 4 < k c t < 6 to 26 < k c t < 30."""
     early, late = (
         measure_growth(run.problem, run.history, *window)
-        / run.problem.theory.get_mean_rate(*window)
+        / run.problem.linear_growth.get_mean_rate(*window)
         for window in ((4.0, 6.0), (26.0, 30.0))
     )
     return early - late

@@ -22,7 +22,7 @@ def run(problem, **options):
     """The history of a problem with a deck of these options, and its report."""
     evolution = problem.build()
     history = march_measured(problem, evolution)
-    return history, problem.report(history)
+    return history, problem.report_on(history)
 
 
 def find_errors(report):
@@ -111,7 +111,7 @@ def test_gases_that_part_near_vacuum_speed(gases, cells, contact):
     history, report = run(problem)
     errors = find_errors(report)
     trusted = errors and max(errors.values()) < 0.05
-    assert trusted != bool(problem.cautions(history))
+    assert trusted != bool(problem.cautions_on(history))
 
 
 COPPER = PlateTable(material="Cu", thickness=1e-3, cells=60)
@@ -165,4 +165,4 @@ def test_gases_at_one_speed_do_not_part():
         deck = RiemannDeck(left=SideState(p=1.0, **side), right=SideState(p=0.1, **side))
         problem = Riemann(deck)
         assert math.isinf(problem.measure_heat_left())
-        assert problem.cautions() == []
+        assert problem.cautions_on() == []

@@ -22,7 +22,7 @@ def march(deck, *settings):
     """A problem, its history and the rows of its report by name."""
     problem = read_deck(deck, settings).make_problem()
     history = march_measured(problem, problem.build())
-    return problem, history, {row.name: row.computed for row in problem.report(history).rows}
+    return problem, history, {row.name: row.computed for row in problem.report_on(history).rows}
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_bodies_of_a_deck_have_the_laws_that_it_chooses_for_them():
     problem = read_deck("flyer-target", chosen).make_problem()
     assert problem.laws["plate-1"].options == {"strength": None, "spall": None}
     assert isinstance(problem.laws["plate-2"].spall, CochranBanner)
-    assert any("plate-1: without a law of strength" in said for said in problem.cautions())
+    assert any("plate-1: without a law of strength" in said for said in problem.cautions_on())
 
     # a key of one body counts before that of all
     own = read_deck("flyer-target", ("strength=true", "plates.0.strength=false")).make_problem()
@@ -157,14 +157,14 @@ def test_an_impact_of_two_solids_has_the_exact_stress(materials, speed):
     )
     settings = f"plates=[{plates}]", f"speed={speed}", f"strength={law}", "run.t_end=4e-7"
     problem, history, _ = march("flyer-target", *settings)
-    rows = {row.name: row for row in problem.report(history).rows}
+    rows = {row.name: row for row in problem.report_on(history).rows}
     assert rows["pressure"].find_error() < 1e-3
 
 
 def test_five_layers_move_the_window_as_it_was_measured():
     cells = tuple(f"plates.{k}.cells={n}" for k, n in enumerate((20, 13, 20, 67, 40)))
     problem, history, _ = march("flyer-target-five-layers", *cells)
-    rows = [row for row in problem.report(history).rows if row.name.startswith("trace_at")]
+    rows = [row for row in problem.report_on(history).rows if row.name.startswith("trace_at")]
     assert len(rows) == len(problem.deck.trace)
     differences = np.array([row.computed - row.theory for row in rows])
     # the precursor's ramp is in no law of the library

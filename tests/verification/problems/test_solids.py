@@ -20,7 +20,7 @@ def run(deck, *settings):
     """The rows of a run's report by name."""
     problem = read_deck(deck, settings).make_problem()
     history = march_measured(problem, problem.build())
-    return {row.name: row for row in problem.report(history).rows}
+    return {row.name: row for row in problem.report_on(history).rows}
 
 
 @pytest.mark.parametrize(

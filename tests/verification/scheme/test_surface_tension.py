@@ -27,7 +27,7 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.links import join
 from shockgrid.hydro.simulation import Simulation
-from shockgrid.problems.problem import find_frequency, find_growth_rate
+from shockgrid.problems.signals import find_frequency, find_growth_rate
 from shockgrid.problems.standard.rayleigh_taylor import (
     GRAVITY_ACCELERATION,
     WAVE_NUMBER,

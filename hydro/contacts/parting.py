@@ -159,10 +159,13 @@ def find_face_behind(outlines, node, body, reach):
                 least = distance_square
                 nearest = start
                 nearest_part = fraction
-            # the way against the node's normal, for faces that look at it
+            # the way against the node's normal, for faces that look at it and are before it: on
+            # from a face's end round-off tells whether a node is behind it
             face_x, face_y = compute_normal(nodes, start, 1.0)
             facing = -(normal_x * face_x + normal_y * face_y)
-            if facing > LEAST_FACING and find_depth(nodes, start, x, y) > 0.0:
+            depth_behind = find_depth(nodes, start, x, y)
+            is_behind = depth_behind > LEAST_FACING * distance_square**0.5
+            if facing > LEAST_FACING and is_behind:
                 distance = distance_square**0.5 / facing
                 if distance < shortest:
                     shortest = distance

@@ -47,6 +47,7 @@ def make_far_wall():
         (30.0, 2000.0, 2e-5, 60),
         (45.0, 1000.0, 0.0, 60),
         (60.0, 1500.0, 5e-6, 60),
+        (50.0, 1500.0, 2e-5, 84),
     ],
 )
 def test_plates_meet_as_on_the_plane_between_them(degrees, speed, gap, steps):

@@ -36,6 +36,7 @@ SUBJECTS: dict[str, dict[str, str]] = {
         "shell": "shockgrid.problems.standard.shell:CollapsingShell",
         "rippled-surface": "shockgrid.problems.standard.rippled_surface:RippledSurface",
         "flying-plate": "shockgrid.problems.standard.flying_plate:FlyingPlate",
+        "elastic-waves": "shockgrid.problems.standard.elastic_waves:ElasticWaves",
     },
     "verification against exact solutions": {
         "riemann": "shockgrid.problems.riemann:Riemann",

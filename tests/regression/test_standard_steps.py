@@ -31,6 +31,7 @@ CASES = {
     "taylor-bar": ("cells=3",),
     "shell": ("cells=6", "rays=6"),
     "rippled-surface": ("cells=6",),
+    "elastic-waves": ("cells=8",),
     "cavity": ("cells=16",),
     "kidder": ("cells=8", "rays=12"),
     "noh": ("cells=16",),

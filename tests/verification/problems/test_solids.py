@@ -174,3 +174,28 @@ def test_impact_of_two_metals_has_the_exact_contact():
         assert np.median(fields["u"][near]) == pytest.approx(exact.u, rel=1e-3)
         stress = (fields["p"] - fields["s_xx"])[near]
         assert np.median(stress) == pytest.approx(exact.stress, rel=1e-3)
+
+
+@pytest.mark.parametrize("mode", ["longitudinal", "shear", "surface", "slip"])
+def test_waves_of_a_solid_have_their_speed_and_little_damping(mode):
+    coarse, fine = (run("elastic-waves", f"mode={mode}", f"cells={cells}") for cells in (16, 32))
+    assert fine["speed"].find_error() < 2e-3
+    damping = [abs(rows["velocity"].computed - rows["velocity"].theory) for rows in (coarse, fine)]
+    assert damping[1] < 0.03
+    assert damping[1] < 0.25 * damping[0]  # of second order at least
+
+
+def test_a_sliding_contact_carries_the_wave_of_a_free_surface():
+    surface = run("elastic-waves", "mode=surface", "cells=16")
+    slip = run("elastic-waves", "mode=slip", "cells=16")
+    assert slip["speed"].computed == pytest.approx(surface["speed"].computed, rel=1e-5)
+
+
+def test_an_elastic_surface_grows_at_the_rate_of_theory():
+    assert run("elastic-waves-growth")["rate"].find_error() < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drive", [2.3, 10.0])
+def test_an_elastic_surface_near_the_limit_and_far_above_it_grows_at_the_rate_of_theory(drive):
+    assert run("elastic-waves-growth", f"drive={drive}", "cells=64")["rate"].find_error() < 0.02

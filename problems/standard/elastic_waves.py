@@ -34,19 +34,14 @@ from shockgrid.hydro.sources import make_gravity
 from shockgrid.problems.deck import MOST_CELLS, Limiter, Regrid, RunControl, key
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.pictures import Colours, draw_field, find_dump, make_panels
-from shockgrid.problems.problem import (
-    BlockPlan,
-    Problem,
-    Report,
-    Row,
-    find_frequency,
-    get_last,
-)
+from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.elastic_waves import (
     compute_elastic_growth,
     compute_rayleigh_speed,
     compute_wave_speeds,
 )
+from shockgrid.problems.report import Report, Row
+from shockgrid.problems.signals import find_frequency
 from shockgrid.problems.solids import (
     SolidDeck,
     SolidMaterial,
@@ -246,8 +241,9 @@ class ElasticWaves(Problem):
         height = 0.5 * float(surface[0] - surface[-1])
         return {"velocity": overlap / size, "displacement": height}
 
-    def report(self, history, final=None) -> Report:
+    def report(self, run) -> Report:
         deck = self.deck
+        history = run.history
         t = history["t"]
         if deck.mode == "growth":
             found = find_sinh_rate(t, history["displacement"])
@@ -256,9 +252,9 @@ class ElasticWaves(Problem):
                 Row("drive", math.nan, deck.drive, "rho g/(G k); it grows from 2 on"),
             ]
         else:
-            found = find_frequency(t, history["velocity"]) / self.k if history else math.nan
-            left = get_last(history, "velocity") / deck.speed
-            exact = math.cos(self.rate * get_last(history, "t")) if history else math.nan
+            found = find_frequency(t, history["velocity"]) / self.k
+            left = run.last("velocity") / deck.speed
+            exact = math.cos(self.rate * run.t)
             rows = [
                 Row("speed", found, self.speed, "speed of the wave [m/s]", digits=6, error="speed"),
                 Row("velocity", left, exact, "velocity at the end over the first", size=1.0),

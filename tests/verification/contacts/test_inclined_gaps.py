@@ -4,73 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from builders import box, check_budget, free, make_body, march_whole, wall_off
-from shockgrid.hydro.eos.materials import find_material
-from shockgrid.hydro.rows import P
-from shockgrid.hydro.simulation import Simulation
-from shockgrid.problems.references.shock_polars import (
-    Body,
-    ShockPolar,
-    search_pressure,
-    sum_deflections,
+from builders import box, check_budget, free, make_body, march_whole
+from oracles.inclined_plates import (
+    CELL,
+    find_oblique_contact,
+    make_wedge,
+    march_to_end,
+    measure_behind,
 )
-
-CELL = 1e-4
-
-
-def find_oblique_contact(plate, base, speed, angle):
-    """Pressure behind the running contact point: shock polars in its frame.
-
-    The plate comes down (along -y) with `speed`, so the point runs at speed / tan(angle) and the
-    plate comes along itself with speed / sin(angle); both turn by `angle` together.
-    """
-    polars = [
-        ShockPolar(Body(material.eos, material.rho0), flow)
-        for material, flow in ((plate, speed / math.sin(angle)), (base, speed / math.tan(angle)))
-    ]
-    high = search_pressure(polars, speed)[1]
-    return brentq(lambda p: sum_deflections(polars, p) - angle, 1e-4 * high, high)
-
-
-def make_wedge(angle, speed, *, height=10, length=60, gap=0.5, below=10, stretch=1.0, materials):
-    """Plate over base; lengths in cells of the plate's height, base `stretch` times as wide."""
-    nodes = box((0.0, 0.0), (length * CELL, height * CELL), (length, height))
-    nodes[1] += gap * CELL + math.tan(angle) * nodes[0]
-    plate = make_body("plate", materials[0], nodes, 0.0, -speed)
-    nodes = box((0.0, -below * CELL), (length * CELL, 0.0), (round(length / stretch), below))
-    base = make_body("base", materials[1], nodes)
-    for block in (plate, base):
-        wall_off(block, "i_min", "i_max")
-        free(block)
-    run = (0.8 * length * CELL * math.tan(angle) + gap * CELL) / speed
-    return plate, base, Simulation([plate, base], [], t_end=run)
-
-
-def find_end(simulation):
-    """x of the contact's end that is furthest on; -inf where there is no contact."""
-    found = -math.inf
-    for pair in simulation.meetings.with_facets:
-        nodes = pair.follower.line[:, pair.follower_half.pins.positions >= 0.0]
-        if nodes.size:
-            found = max(found, float(nodes[0].max()))
-    return found
-
-
-def march_to_end(simulation):
-    """Rows, and times and places at which the contact's end has come a cell further."""
-    ends = []
-    before = 0.0
-
-    def note_end(rows):
-        nonlocal before
-        x = find_end(simulation)
-        if x > (ends[-1][1] + 0.3 * CELL if ends else -1.0):
-            ends.append((before, x))
-        before = simulation.t
-
-    return march_whole(simulation, note_end), np.array(ends)
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.problems.references.shock_polars import Body, ShockPolar
 
 
 @pytest.mark.parametrize(
@@ -97,23 +42,17 @@ def test_running_contact_point(degrees, speed, materials, stretch, length, bar):
     runs = float(np.polyfit(late[:, 0], late[:, 1], 1)[0])
     assert runs == pytest.approx(speed / math.tan(angle), rel=bar)
     wanted = find_oblique_contact(*(find_material(name) for name in materials), speed, angle)
-    for block, cells, line in (
-        (plate, block_row(plate, 0), plate.nodes[0, :, 0]),
-        (base, block_row(base, -1), base.nodes[0, :, -1]),
-    ):
-        x = 0.5 * (line[1:] + line[:-1])
-        behind = (x < ends[-1, 1] - 6 * CELL) & (x > ends[-1, 1] - 18 * CELL)
-        assert behind.sum() > 5, block.name
-        assert float(cells[behind].mean()) == pytest.approx(wanted, rel=1e-2), block.name
+    behind = measure_behind(plate, base, ends[-1, 1])
+    assert behind.plate_pressure == pytest.approx(wanted, rel=1e-2)
+    assert behind.base_pressure == pytest.approx(wanted, rel=1e-2)
+    base_material = find_material(materials[1])
+    polar = ShockPolar(Body(base_material.eos, base_material.rho0), speed / math.tan(angle))
+    assert behind.angle == pytest.approx(polar.deflection(wanted), rel=1e-2)
     dts = np.array([row["dt"] for row in rows[6:-2]])
     assert dts.min() > 1e-4 * dts.max()
     assert rows[-1]["contacts_made"] - rows[-1]["contacts_opened"] == 1
     assert rows[-1]["cells_not_convex"] == 0
     check_budget(rows, names=("momentum_y", "energy"))
-
-
-def block_row(block, j):
-    return block.state[P, 1:-1, 1:-1][:, j]
 
 
 @pytest.mark.parametrize("degrees", [0.0, 0.01])

@@ -53,7 +53,7 @@ from shockgrid.problems.report import Report
 from shockgrid.problems.solids import BodyTable, SolidDeck, find_laws, list_fluids
 from shockgrid.regrid.domains import distribute_by_arc_length
 from shockgrid.regrid.equidistribution.weights import Expression
-from shockgrid.regrid.errors import BadInput, RegridFailure, suggest
+from shockgrid.regrid.errors import BadInput, Mistakes, RegridFailure, suggest
 from shockgrid.regrid.given import (
     find_start,
     make_boundary,
@@ -346,7 +346,14 @@ def count_cells(block: BlockTable) -> int:
 
 RUN_OF_FACES = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<side>\w+)(\[(?P<start>\d+):(?P<stop>\d+)\])?")
 # of every block, see `measure_means`
-MEASURED = {"u_mean": "m/s", "v_mean": "m/s", "x_mass": "m", "p_max": "Pa"}
+MEASURED = {
+    "u_mean": "m/s",
+    "v_mean": "m/s",
+    "x_mass": "m",
+    "p_max": "Pa",
+    "p_max_x": "m",
+    "p_max_y": "m",
+}
 
 
 class Blocks(Problem):
@@ -358,29 +365,45 @@ class Blocks(Problem):
     def __init__(self, deck: BlocksDeck):
         super().__init__(deck)
         names = [block.name for block in deck.block]
-        for name in names:
-            if names.count(name) > 1:
-                raise BadInput(f"deck: {names.count(name)} blocks are called {name!r}")
-        self.materials = {block.name: find_block_material(block) for block in deck.block}
+        mistakes = Mistakes()
+        mistakes.sentences += [
+            f"deck: {names.count(name)} blocks are called {name!r}"
+            for name in dict.fromkeys(names)
+            if names.count(name) > 1
+        ]
+        self.materials = {}
+        for block in deck.block:
+            with mistakes.gather():
+                self.materials[block.name] = find_block_material(block)
+        mistakes.check()
         tables = {block.name: block for block in deck.block}
         self.laws = find_laws(deck, self.materials, tables)
         deck.regrid.check_weight()
         across = deck.geometry == "axisymmetric" and deck.gravity[1]
-        if across:
-            raise deck.error("gravity", "in axisymmetric flow y is the radius; it is along x")
+        with mistakes.gather():
+            if across:
+                raise deck.error("gravity", "in axisymmetric flow y is the radius; it is along x")
         for link in deck.link:
+            where = f"deck: link: {link.sides}"
             if link.tension and link.kind == "slide":
-                raise BadInput(f"deck: link: {link.sides}: a sliding contact has no tension")
+                mistakes.sentences.append(f"{where}: a sliding contact has no tension")
             if link.bonded and link.kind != "interface":
-                raise BadInput(
-                    f"deck: link: {link.sides}: bonded is for interfaces; a {link.kind} is none"
+                mistakes.sentences.append(
+                    f"{where}: bonded is for interfaces; a {link.kind} is none"
                 )
+        mistakes.check()
         self.units = {f"{what}_{name}": unit for name in names for what, unit in MEASURED.items()}
 
     @functools.cached_property
     def grids(self) -> dict[str, np.ndarray]:
         """Nodes (2, ni+1, nj+1) of every block; BadInput where there is no valid grid."""
-        return {block.name: make_grid(self.deck, block) for block in self.deck.block}
+        grids = {}
+        mistakes = Mistakes()
+        for block in self.deck.block:
+            with mistakes.gather():
+                grids[block.name] = make_grid(self.deck, block)
+        mistakes.check()
+        return grids
 
     def estimate_cells(self) -> int:
         """Cells of the blocks on curves; grids in files are there already."""
@@ -411,26 +434,17 @@ class Blocks(Problem):
 
     def build(self) -> Simulation:
         deck = self.deck
+        blocks = {}
         links = []
-        blocks = {table.name: self.make_block(table) for table in deck.block}
+        mistakes = Mistakes()
+        for table in deck.block:
+            with mistakes.gather():
+                blocks[table.name] = self.make_block(table)
+        mistakes.check()
         for link in deck.link:
-            pair = []
-            for text in link.sides:
-                where = f"deck: link: {text!r}"
-                found = RUN_OF_FACES.fullmatch(text.strip())
-                if not found:
-                    raise BadInput(
-                        f'{where} is not a side; write "block.i_max" or "block.i_max[0:8]"'
-                    )
-                if (name := found["block"]) not in blocks:
-                    raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
-                faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
-                pair.append((blocks[name], found["side"], *faces))
-            options: dict[str, Any] = {"tension": link.tension} if link.tension else {}
-            if link.bonded:
-                options["bonded"] = True
-            slides = link.kind == "slide"
-            links.append(slide(*pair) if slides else join(link.kind, *pair, **options))
+            with mistakes.gather():
+                links.append(self.make_link(link, blocks))
+        mistakes.check()
         flow = self.simulate(
             blocks.values(),
             links,
@@ -441,6 +455,25 @@ class Blocks(Problem):
         )
         necks = Necks(flow.meetings.bodies) if flow.meetings.pairs else None
         return flow
+
+    def make_link(self, link: LinkTable, blocks: dict[str, Block]) -> Any:
+        """A link between sides of the blocks."""
+        pair = []
+        for text in link.sides:
+            where = f"deck: link: {text!r}"
+            found = RUN_OF_FACES.fullmatch(text.strip())
+            if not found:
+                raise BadInput(f'{where} is not a side; write "block.i_max" or "block.i_max[0:8]"')
+            if (name := found["block"]) not in blocks:
+                raise BadInput(f"{where}: there is no block {name!r}{suggest(name, blocks)}")
+            faces = (int(found["start"]), int(found["stop"])) if found["start"] else ()
+            pair.append((blocks[name], found["side"], *faces))
+        if link.kind == "slide":
+            return slide(*pair)
+        options: dict[str, Any] = {"tension": link.tension} if link.tension else {}
+        if link.bonded:
+            options["bonded"] = True
+        return join(link.kind, *pair, **options)
 
     def make_block(self, table: BlockTable) -> Block:
         """A block with its state and the segments of its sides that are not linked."""
@@ -476,7 +509,7 @@ class Blocks(Problem):
         return block
 
     def measure(self, evolution: Simulation) -> dict[str, float]:
-        """Mean velocity and centre of mass by mass, greatest pressure, of every block."""
+        """Mean velocity and centre of mass by mass, greatest pressure and its cell, by block."""
         return {
             f"{name}_{table.name}": number
             for table, block in zip(self.deck.block, evolution.blocks, strict=True)
@@ -486,10 +519,13 @@ class Blocks(Problem):
     def report(self, run) -> Report:
         notes = []
         for name in (block.name for block in self.deck.block if run.begun):
-            u, v, x, p = (run.history[f"{what}_{name}"] for what in MEASURED)
+            u, v, x, p, x_most, y_most = (run.history[f"{what}_{name}"] for what in MEASURED)
+            row = int(np.argmax(p))
             notes.append(
                 f"{name}: mean velocity {u[-1]:.5g} m/s along x, {v[-1]:.3g} along y; its centre "
-                f"of mass went {x[-1] - x[0]:.4g} m along x; pressure up to {max(p):.4g} Pa"
+                f"of mass went {x[-1] - x[0]:.4g} m along x; pressure up to {p[row]:.4g} Pa, in "
+                f"the cell at ({x_most[row]:.4g}, {y_most[row]:.4g}) m at t = "
+                f"{run.history['t'][row]:.4g} s"
             )
         return Report(self.deck.title or "blocks of a deck:", notes=notes)
 
@@ -498,8 +534,10 @@ def measure_means(block: Block) -> list[float]:
     """What MEASURED names, of a block."""
     rho, u, v, p = block.state[:, 1:-1, 1:-1]
     mass = rho * block.volume
-    x, _ = compute_centres(block.nodes)
-    return [*(float((mass * field).sum() / mass.sum()) for field in (u, v, x)), float(p.max())]
+    x, y = compute_centres(block.nodes)
+    means = [float((mass * field).sum() / mass.sum()) for field in (u, v, x)]
+    most = np.unravel_index(p.argmax(), p.shape)
+    return [*means, float(p[most]), float(x[most]), float(y[most])]
 
 
 def find_block_material(block: BlockTable) -> Material:

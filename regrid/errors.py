@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,26 @@ class BadInput(Exception):
     The message says what, where and what would be right.  The command line prints it and exits
     with code 2.
     """
+
+
+class Mistakes:
+    """BadInput of several parts of an input, gathered so that one check tells of all of them."""
+
+    def __init__(self) -> None:
+        self.sentences: list[str] = []
+
+    @contextlib.contextmanager
+    def gather(self) -> Iterator[None]:
+        """Keep what BadInput says that comes from the block, and go on behind it."""
+        try:
+            yield
+        except BadInput as error:
+            self.sentences += str(error).splitlines()
+
+    def check(self) -> None:
+        """Raise BadInput with all sentences, a line each, if there are any."""
+        if self.sentences:
+            raise BadInput("\n".join(dict.fromkeys(self.sentences)))
 
 
 @dataclass(frozen=True)

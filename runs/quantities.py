@@ -22,6 +22,7 @@ def add_unit(number: float, unit: str, digits: int = 6) -> str:
     return f"{number:.{digits}g}" if unit == "1" else f"{number:.{digits}g} {unit}"
 
 
+BETWEEN_COLUMNS = re.compile(r"(?<=\S)  +(?=\S)")
 UNITS = re.compile(
     r"(?<=\d) (?:s|m|m/s|Pa|kg/m3)(?![\w/])|"  # behind a number, in brackets
     r" ?\[(?:1/)?(?:s|m|Pa|kg|N|J|K)\d?(?:/(?:kg|m|s|K)\d?)*\]"
@@ -29,8 +30,21 @@ UNITS = re.compile(
 
 
 def drop_units(words: str, t_unit: str) -> str:
-    """The words without SI units where the unit of time is "1": the deck's numbers have none."""
-    return UNITS.sub("", words) if t_unit == "1" else words
+    """The words without SI units where the unit of time is "1": the deck's numbers have none.
+
+    In a line of a table the columns stay where they are.
+    """
+    if t_unit != "1":
+        return words
+    lines = []
+    for line in words.split("\n"):
+        shorter = UNITS.sub("", line)
+        gap = BETWEEN_COLUMNS.search(shorter)
+        if gap:
+            room = " " * (len(line) - len(shorter))
+            shorter = shorter[: gap.end()] + room + shorter[gap.end() :]
+        lines.append(shorter)
+    return "\n".join(lines)
 
 
 def describe_seconds(low: float, high: float | None = None) -> str:

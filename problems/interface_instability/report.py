@@ -121,7 +121,7 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     until = min(t[-1], growth.open_time)
     after = (t > problem.arrival + 0.3 * (until - problem.arrival)) & (t <= until)
     speed = fit_slope(t, column["interface_mean"], after)
-    label = "interface speed" if math.isfinite(speed) else ""
+    label = "interface speed [m/s]" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
     last = Row("interface_speed", speed, exact, label, digits=5, studied=True, source=source)
     modes = problem.harmonics
@@ -141,7 +141,7 @@ def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
     known = [row for row in rows if row.label and row.source.startswith("linear")]
     rows.append(last)
     if any(not is_still(theory, row.theory) for row in known):
-        label = f"impulsive model ({theory.impulse})"
+        label = f"impulsive model ({theory.impulse}) [m/s]"
         source = "for comparison"
         rows.append(Row("impulsive", math.nan, theory.impulsive, label, digits=5, source=source))
     if growth.linear_reach < kct:
@@ -168,7 +168,9 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
     if window is None or mode.column not in column:
         return [Row(name, studied=True)]
     head = f"mode {mode.number}: " if several else ""
-    label = f"{head}(da/dt)/(k a0), {window.first:g} < k c t < {window.last:.3g}" if shown else ""
+    label = (
+        f"{head}(da/dt)/(k a0) [m/s], {window.first:g} < k c t < {window.last:.3g}" if shown else ""
+    )
     rate = growth.measure_rate(column, mode, window.first, window.last)
     reduction = growth.find_reduction(mode.number)
     expected = float(theory.get_mean_rate(window.first, window.last)) / reduction
@@ -213,7 +215,7 @@ def _compare_model(growth, column, kct: float) -> Row:
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
-    label = f"amplitude at k c t = {last:.3g}" if ends else "amplitude at the end"
+    label = f"amplitude at k c t = {last:.3g} [m]" if ends else "amplitude at the end [m]"
     why = "waves return" if last == growth.open_reach else "its range ends"
     source = "Padé model, rough" + (f": {why} there" if ends else "")
     return Row("model_amplitude", computed, model, label, digits=5, source=source)
@@ -326,8 +328,8 @@ class Results:
         reflected = theory.reflected if jump > NO_WAVE * self.shock.p else "none"
         ahead = float(self.eos_first.sound_speed(self.rho_first, deck.pressure))
         head = [
-            f"Mach {self.shock.shock_speed / ahead:.3g} shock (to p = {self.shock.p:.4g}) from "
-            f"density {self.rho_first:g} into density {self.rho_second:g}; "
+            f"Mach {self.shock.shock_speed / ahead:.3g} shock (to p = {self.shock.p:.4g} Pa) from "
+            f"density {self.rho_first:g} kg/m3 into density {self.rho_second:g} kg/m3; "
             f"{_describe_modes(self)}, {deck.cells} cells per wavelength, {times}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
@@ -341,7 +343,7 @@ class Results:
         notes += _describe_handover(self, run.history)
         far = column["far_transverse_speed"].max() / theory.sound_speed
         notes.append(
-            f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g}, largest "
+            f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g} m, largest "
             f"transverse speed in the far field {far:.1e} of the sound speed"
         )
         return Report("\n".join(head), rows, notes)

@@ -217,12 +217,14 @@ def study(deck, **options) -> int:
 @cli.command()
 @click.argument("deck", metavar="PROBLEM_OR_DECK")
 @setting
-def check(deck, settings) -> None:
-    """Check a deck and print it with every key and its meaning.
+@click.option("--all", "everything", is_flag=True, help="Print the keys at their defaults, too.")
+def check(deck, settings, everything) -> None:
+    """Check a deck and print the keys that it sets, each with its meaning.
 
-    Keys without a value are commented out.  Cautions about the results go to
-    standard error.
+    Of a problem by its name all keys are printed, those without a value
+    commented out.  Cautions about the results go to standard error.
     """
+    from shockgrid.problems.registry import is_problem
     from shockgrid.regrid.compilation.first_calls import interpreted
     from shockgrid.runs.deck import reading as deck_reading
     from shockgrid.runs.deck.checking import describe_deck
@@ -233,7 +235,9 @@ def check(deck, settings) -> None:
     with interpreted():
         problem = checked.make_problem()
     check_deck_fully(checked, problem)
-    echo(describe_deck(checked.problem, checked.deck, problem.t_unit), nl=False)
+    bare = is_problem(deck) and not settings
+    whole = everything or bare
+    echo(describe_deck(checked.problem, checked.deck, problem.t_unit, not whole), nl=False)
     with checked.numbers_in_reach(), interpreted():
         cautions = describe_cautions(problem)
     for line in cautions:

@@ -12,6 +12,7 @@ import json
 import math
 import re
 import textwrap
+import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from shockgrid.problems.registry import load_problem, read_docstring
 from shockgrid.regrid.errors import BadInput, find_nearest
 from shockgrid.runs.quantities import drop_units
 
+UNKNOWN = object()  # the default of a key that has none
 UNIONS = (typing.Union, type(int | str))
 
 
@@ -365,25 +367,57 @@ DECK_LINE_WIDTH = 100
 DECK_COMMENT_COLUMN = 34
 
 
-def describe_deck(name: str, deck: Deck, t_unit: str = "s") -> str:
+def describe_deck(name: str, deck: Deck, t_unit: str = "s", only_set: bool = False) -> str:
     """The deck of problem `name` as TOML, each key with its meaning; those without a value are
-    commented out.  t_unit: that of the problem."""
+    commented out.  t_unit: that of the problem; only_set: keys that differ from the defaults."""
     text = f"problem = {show(name)}\n"
-    for line in _write_table(deck, ""):
+    lines = _write_table(deck, "", type(deck)(), set()) if only_set else _write_table(deck, "")
+    for line in lines:
         key, mark, comment = line.partition("# ")
         text += f"{key}{mark}{drop_units(comment, t_unit)}".rstrip() + "\n"
+    if only_set:
+        text += f"\n# all other keys have their defaults; list them: shockgrid check {name}\n"
     return text
 
 
-def _write_table(table: DeckTable, path: str) -> Iterator[str]:
-    """Lines of the keys of a table with the dotted name `path`, then of the tables in it."""
+def _find_defaults(table: DeckTable) -> Any:
+    """The values that the keys of a table have where they are left out, as attributes."""
+    defaults = {}
+    for field in msgspec.structs.fields(table):
+        if field.default is not msgspec.NODEFAULT:
+            defaults[field.name] = field.default
+        elif field.default_factory is not msgspec.NODEFAULT:
+            defaults[field.name] = field.default_factory()
+    return types.SimpleNamespace(**defaults)
+
+
+def _write_table(
+    table: DeckTable, path: str, default: Any = None, said: set[tuple[str, str]] | None = None
+) -> Iterator[str]:
+    """Lines of the keys of a table with the dotted name `path`, then of the tables in it.
+
+    default: a table, or the like, of values; keys that have the same ones are left out.  said: the
+    keys with their meanings so far, none of which is said twice.
+    """
+
+    def explain(line: str, words: str) -> list[str]:
+        once = line.partition(" = ")[0], words
+        if said is not None and once in said:
+            return [line]
+        if said is not None:
+            said.add(once)
+        return _explain(line, words)
+
     settings = table.__struct_config__
     tables = []
     if settings.tag_field:
         yield f"{settings.tag_field} = {show(settings.tag)}"
     for field in msgspec.structs.fields(table):
         value = getattr(table, field.name)
-        if field.name == DIGESTS and not value:  # a run's own key: nobody types it
+        if field.name == DIGESTS and (default is not None or not value):  # a run's own key
+            continue
+        usual = getattr(default, field.name, UNKNOWN)
+        if default is not None and value == usual:
             continue
         part = make_parts(field.type)
         inner = resolve(part, part)
@@ -395,17 +429,21 @@ def _write_table(table: DeckTable, path: str) -> Iterator[str]:
         unset = value is None
         if entries and all(isinstance(entry, DeckTable) for entry in entries):
             tables.append(
-                (f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, description)
+                (f"[{head}]" if entries[0] is value else f"[[{head}]]", entries, description, usual)
             )
         elif unset and "properties" in inner:
-            tables.append((f"# [{head}]", inner["properties"], description))
+            tables.append((f"# [{head}]", inner["properties"], description, None))
         else:
             form = f" ({describe(part, part)})" if unset or "enum" in inner else ""
             line = f"# {field.name} =" if unset else f"{field.name} = {_write_value(value)}"
-            yield from _explain(line, description.rstrip(".") + form)
-    for line, entries, comment in tables:
+            yield from explain(line, description.rstrip(".") + form)
+    for line, entries, comment, usual in tables:
         for entry in entries if isinstance(entries, list | tuple) else ():
-            yield from ("", *_explain(line, comment), *_write_table(entry, line.strip("[]")))
+            known = None
+            if default is not None:
+                known = usual if type(usual) is type(entry) else _find_defaults(entry)
+            yield from ("", *explain(line, comment))
+            yield from _write_table(entry, line.strip("[]"), known, said)
         if isinstance(entries, Mapping):
             yield from ("", *_explain(line, comment))
             for name, one in entries.items():

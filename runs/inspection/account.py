@@ -259,7 +259,8 @@ RULES = (
          "{share} of the faces of first order",
          "mean part of the faces that are computed at first order, where second gave no positive "
          "state"),
-    Rule("voids", most("voided_cells"), 0.0, "voids in {value:.0f} cells",
+    Rule("voids", most("voided_cells"), 0.0,
+         "voids in {value:.0f} cells, opened by tension beyond the material's strength",
          "most failed cells with a void in a step"),
     Rule("shared cells", mean("shared_cells", lambda n, cells: n / cells), 0.03,
          "{share} of the cells redistribute their states",

@@ -178,3 +178,22 @@ def test_a_slip_line_between_blocks_of_unlike_cells_stays(shockgrid):
     Path("slip.toml").write_text(SLIP.replace('kind = "slide"', 'kind = "interface"'))
     code, _, error = shockgrid("check", "slip.toml")
     assert code == 2 and "has 7; they must be as many, or be a sliding contact (slide)" in error
+
+
+def test_the_mistakes_of_all_blocks_are_told_at_once(shockgrid):
+    wrong = SLIP.replace('"lower"\ncells', '"lower"\nu = "1/(x - x)"\ncells')
+    wrong = wrong.replace('material = { eos = "ideal-gas", gamma = 1.667 }', 'material = "coper"')
+    Path("slip.toml").write_text(wrong)
+    code, _, error = shockgrid("check", "slip.toml")
+    assert code == 2 and "block 'upper': there is no material 'coper'" in error
+    Path("slip.toml").write_text(wrong.replace('"coper"', '"copper"\nv = "y/(y - y)"'))
+    code, _, error = shockgrid("check", "slip.toml")
+    assert code == 2 and error.count("\n") == 2, error
+    assert "block 'lower', u" in error and "block 'upper', v" in error
+
+
+def test_check_prints_what_a_deck_sets(shockgrid):
+    Path("slip.toml").write_text(SLIP)
+    _, short, _ = shockgrid("check", "slip.toml")
+    _, whole, _ = shockgrid("check", "slip.toml", "--all")
+    assert "max_steps = 10" in short and "cfl" not in short and "cfl" in whole

@@ -140,10 +140,13 @@ def is_film(inner, k, line, a, x, y):
     """Whether node `k`, at (x, y), lies on the other side of a film of one body than face `a`.
 
     inner (2, n): the next nodes inwards.  That of a node which has come through the face is in
-    front of it, that of one on the film's other side behind.
+    front of it, that of one on the film's other side behind.  At the end of a line, where the next
+    node is one of the next side, that of the node beside it is inside the body.
     """
+    last = inner.shape[1] - 1
+    inside = min(max(k, 1), max(1, last - 1))
     deep = max(0.0, find_depth(line, a, x, y))
-    return -find_depth(line, a, inner[0, k], inner[1, k]) <= 2.0 * deep
+    return -find_depth(line, a, inner[0, inside], inner[1, inside]) <= 2.0 * deep
 
 
 @compiled_once

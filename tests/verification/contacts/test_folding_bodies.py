@@ -149,3 +149,26 @@ def test_a_wall_goes_on_beyond_its_end(geometry):
         check_budget(rows, names=("energy",))
     x = block.nodes[0]
     assert np.abs(x + x[::-1] - 4e-3).max() < 1e-10 * THICK
+
+
+def test_corners_of_one_body_meet():
+    """The ends of a hook close on each other, corner to corner; then their sides next to it do.
+
+    The corners stay in front of each other, and the halves mirror images.
+    """
+    angle = 5.0 / 6.0 * np.pi * np.linspace(1.0, -1.0, 25)[:, None]
+    rings = 1e-3 * np.linspace(1.0, 1.4, 5)
+    nodes = np.array([np.cos(angle) * rings, np.sin(angle) * rings])
+    x, y = compute_centres(nodes)
+    closing = -3e5 * y * (1.0 - x / np.hypot(x, y))
+    hook = make_body("hook", "Al1100", nodes, 0.0, closing)
+    free(hook, "i_min", "i_max", "j_min", "j_max")
+    simulation = Simulation([hook], [], t_end=2.2e-6)
+    gaps = []
+    while not simulation.finished:
+        row = simulation.advance()
+        gaps.append(hook.nodes[1, 0, 0] - hook.nodes[1, -1, 0])
+    assert row["contacts_made"] > 1
+    assert min(gaps) > -1e-9 * CELL
+    mirrored = hook.nodes[:, ::-1] * np.array([1.0, -1.0])[:, None, None]
+    assert np.abs(hook.nodes - mirrored).max() < 1e-9 * CELL

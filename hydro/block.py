@@ -40,7 +40,7 @@ from shockgrid.hydro.mixture.sides import RIM_FIELDS
 from shockgrid.hydro.perimeter.contacts import fill_open_flux
 from shockgrid.hydro.perimeter.plan import PerimeterPlan
 from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
-from shockgrid.hydro.rows import HELD_ARRAYS, RHO, P, make_held
+from shockgrid.hydro.rows import HELD_ARRAYS, MIXED_TOTAL_ROWS, RHO, TOTAL_ROWS, P, make_held
 from shockgrid.hydro.strength.laws.base import StrengthLaw
 from shockgrid.hydro.strength.spall.base import SpallLaw
 from shockgrid.hydro.strength.stress import Stress, add_stress_fields, stiffen_wave_law
@@ -194,7 +194,8 @@ class Block:
         # which cells this process updates, and whether it holds all of them (`hydro.ranks`)
         self.update_rows_only(0, self.ni)
         self.is_here = True
-        self.totals = TileTotals(count_tiles(self.ni, self.nj))
+        columns = MIXED_TOTAL_ROWS if self.mixed else TOTAL_ROWS
+        self.totals = TileTotals(count_tiles(self.ni, self.nj), columns)
         # the perimeter: its faces, accelerations (2, faces) by a body source of their cells, and
         # volumes of polygon cells beyond their straight faces
         faces = 2 * (self.ni + self.nj)

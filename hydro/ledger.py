@@ -16,7 +16,6 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.eos.mixture import MASS_FRACTION
 from shockgrid.hydro.rim import CARRIED_FLUX, ENERGY, MASS, MOMENTUM_X, MOMENTUM_Y
-from shockgrid.hydro.rows import RHO
 from shockgrid.regrid.jit import kernel
 
 
@@ -37,12 +36,6 @@ def sum_fluxes(rim, spans):
             momentum_y += rim[MOMENTUM_Y, face]
             energy += rim[ENERGY, face]
     return mass, momentum_x, momentum_y, energy
-
-
-def sum_first_mass(block: Block) -> float:
-    """Mass of the first material in a block of two."""
-    mass = block.volume * block.state[RHO, 1:-1, 1:-1]
-    return float((mass * block.carried[MASS_FRACTION, 1:-1, 1:-1]).sum())
 
 
 def sum_first_flux(block: Block) -> float:
@@ -107,7 +100,7 @@ class Ledger:
             if names is None:
                 sums[block.material] += total.mass
             else:
-                split_mass(sums, names, total.mass, sum_first_mass(block))
+                split_mass(sums, names, total.mass, total.first_mass)
             momentum_x += total.momentum_x
             momentum_y += total.momentum_y
             energy += total.energy

@@ -38,6 +38,9 @@ FLUX_ROWS = 6
     EMPTIED,
 ) = range(8)
 TOTAL_ROWS = 8
+# of a block of two materials one more: the mass of the first
+TOTAL_FIRST_MASS = 8
+MIXED_TOTAL_ROWS = 9
 CONSERVED = slice(TOTAL_MASS, VOIDED)
 MOMENTUM_AND_ENERGY = slice(TOTAL_MOMENTUM_X, VOIDED)
 NO_C2 = 1e300  # least c² of no cell at all

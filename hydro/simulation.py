@@ -151,6 +151,7 @@ class Simulation:
         self.handover = handover
         self.refining = refining
         self._counts_cells = refining is not None
+        self._processors: int | None = None  # for the threads of this rank
         self._handed_over = ""  # why, in the row of the step in which it was
         self._connect(blocks, links, make_regridder)
         check_overlaps(blocks, links)
@@ -257,11 +258,6 @@ class Simulation:
         """
         if ranks.cuts and self._flow.source.function is not None:
             raise BadInput("blocks that a body source acts on cannot be cut among ranks")
-        if self.handover is not None and ranks.size > 1:
-            raise BadInput(
-                "only one process can lay both materials on one grid during a run; leave handover "
-                "out, or run without MPI"
-            )
         if self.refining is not None and ranks.size > 1:
             raise BadInput(
                 "only one process can add grid lines during a run; set refine = false, or run "
@@ -269,6 +265,7 @@ class Simulation:
             )
         cells = [(last - first) * self._blocks[n].nj for n, first, last in ranks.pieces]
         ranks.workers = Workers(cells or [1], self._wanted_threads, processors)
+        self._processors = processors
         self._shared = ranks
         self.small_cells.blocks = ranks
         self._body_source.blocks = ranks
@@ -304,23 +301,20 @@ class Simulation:
         """One step; returns its history row.  Raises RunFailure with block, cell and time."""
         if self.finished:
             raise BadInput(f"the run is at its end already: {self.finished}")
-        ranks = self._shared
         clock = self.clock
         # one step, or a failure that all ranks know
-        ranks.begin_step()
+        self._shared.begin_step()
         if self.tension.lines:
             clock.tension_dt = self.tension.find_step()
-        try:
-            self._check_collapse()
-            touching = self.meetings.find(clock.t, clock.step)
-            self._overlaps.check(clock.t, clock.step, touching)
-            record = take_step(self._flow)
-        except RunFailure as failure:  # all ranks have agreed on it
-            ranks.end_step()
-            if self.handover is None or self.handover.first_nodes is not None:
-                raise
-            self._hand_over_after(failure)
-            return self.advance()
+        while True:
+            try:
+                self._check_collapse()
+                touching = self.meetings.find(clock.t, clock.step)
+                self._overlaps.check(clock.t, clock.step, touching)
+                record = take_step(self._flow)
+                break
+            except RunFailure as failure:  # all ranks have agreed on it
+                self._go_on_after(failure)
         self.last_reason = record.reason or self.last_reason
         # at the end, or with other grid lines from now on
         if record.last:
@@ -333,8 +327,21 @@ class Simulation:
         row = self.compute_row(record.limit, record.retries)
         self._handed_over = ""
         self._note_end()  # within the step: every rank has what it reads
-        ranks.end_step()
+        self._shared.end_step()
         return row
+
+    def _go_on_after(self, failure: RunFailure) -> None:
+        """Lay both materials on one grid where the flow ends with their line, or say why not."""
+        if self.handover is None or self.handover.first_nodes is not None:
+            self._shared.end_step()
+            raise failure
+        self.last_reason = failure
+        try:
+            self.hand_over()
+        except (BadInput, RunFailure):
+            self._shared.end_step()
+            raise failure from None
+        self._handed_over = failure.cause or "failure"
 
     def _note_end(self) -> None:
         if self.finished is None and self._find_end is not None:
@@ -390,6 +397,8 @@ class Simulation:
         assert self.handover is not None
         kept = self._keep_parts()
         line_rule = self._line_rule
+        ranks = self._shared
+        ranks.share()  # all ranks lay the same blocks, from the same numbers
         try:
             self._join_blocks(*self.handover.merge(self._blocks))
         except (BadInput, RunFailure):
@@ -400,18 +409,11 @@ class Simulation:
         self.motion.counts = kept["motion"].counts  # of the step that is over
         self._update_rates()
         self.clock.rate = self.small_cells.find_first_rate(self.t)
+        if ranks.size > 1:
+            self.use_ranks(ranks.make_for(self._blocks), self._processors)
         # what the old cells and the line had asked of the step
         self.clock.retry_dt = np.inf
         self.clock.stretch_rate = 0.0
-
-    def _hand_over_after(self, failure: RunFailure) -> None:
-        """Lay both materials on one grid where the flow ends with their line, or say why not."""
-        self.last_reason = failure
-        try:
-            self.hand_over()
-        except (BadInput, RunFailure):
-            raise failure from None
-        self._handed_over = failure.cause or "failure"
 
     def _join_blocks(
         self, blocks: list[Block], links: list, make_regridder: Callable[[], object]

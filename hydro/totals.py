@@ -27,7 +27,8 @@ class Sums(NamedTuple):
 
     least_c2: the least c² [m²/s²]; first_order: faces of first order; mass, momentum, energy: per
     depth, in axisymmetric flow per radian [kg/m, N s/m, J/m; kg, N s, J]; voided: cells with voids;
-    emptied: cells of fragments that have given up almost all of their mass.
+    emptied: cells of fragments that have given up almost all of their mass; first_mass: that of the
+    first material in a block of two.
     """
 
     least_c2: float
@@ -38,21 +39,22 @@ class Sums(NamedTuple):
     energy: float
     voided: float
     emptied: float
+    first_mass: float = 0.0
 
 
 class TileTotals:
-    """Totals of `tiles` tiles: `rows` (tiles + 1, 8), columns as in `hydro.rows`.
+    """Totals of `tiles` tiles: `rows` (tiles + 1, columns), columns as in `hydro.rows`.
 
-    of_tiles: the rows that the update writes; rest: the last row, see above; array (8,): the sums,
-    as kernels and other ranks write them.
+    of_tiles: the rows that the update writes; rest: the last row, see above; array (columns,): the
+    sums, as kernels and other ranks write them.
     """
 
-    def __init__(self, tiles: int):
-        self.rows = np.zeros((tiles + 1, TOTAL_ROWS))
+    def __init__(self, tiles: int, columns: int = TOTAL_ROWS):
+        self.rows = np.zeros((tiles + 1, columns))
         self.of_tiles = self.rows[:-1]
         self.rest = self.rows[-1]
         self.rest[LEAST_C2] = NO_C2
-        self.array = np.zeros(TOTAL_ROWS)
+        self.array = np.zeros(columns)
         self._sums: Sums | None = None  # of the array, while it is valid
 
     def start_update(self) -> None:

@@ -32,15 +32,16 @@ from shockgrid.hydro.rows import (
     ENERGY,
     LEAST_C2,
     MASS,
+    MIXED_TOTAL_ROWS,
     MOMENTUM_X,
     MOMENTUM_Y,
     NO_C2,
     RHO,
     TOTAL_ENERGY,
+    TOTAL_FIRST_MASS,
     TOTAL_MASS,
     TOTAL_MOMENTUM_X,
     TOTAL_MOMENTUM_Y,
-    TOTAL_ROWS,
     P,
     U,
     V,
@@ -337,6 +338,7 @@ def make_mixed_update(eos_class, limiter: str):
         sums[TOTAL_MOMENTUM_X] += momentum_x
         sums[TOTAL_MOMENTUM_Y] += momentum_y
         sums[TOTAL_ENERGY] += total
+        sums[TOTAL_FIRST_MASS] += first
         return rate
 
     @kernel(allocates=False)
@@ -347,7 +349,7 @@ def make_mixed_update(eos_class, limiter: str):
         nodes (2, ni + 1, nj + 1) before and after; slopes and marks of `make_fill_slopes`.
         held_new: states and fractions, filled; rim: with the fluxes through the sides; rows: the
         first row and the one after the last; scratch (3, 7, nj + 1); measured, filled: totals
-        (tiles, 8) with columns as in `hydro.rows`, of tiles of rows, in the first of those that lie
+        (tiles, 9) with columns as in `hydro.rows`, of tiles of rows, in the first of those that lie
         side by side, and rates (ni, nj).
         """
         totals, rates = measured
@@ -356,7 +358,7 @@ def make_mixed_update(eos_class, limiter: str):
         tiles_of_rows = (nodes.shape[1] - 2) // TILE_ROWS + 1
         side_by_side = totals.shape[0] // tiles_of_rows
         for tile in range(first // TILE_ROWS * side_by_side, totals.shape[0]):
-            for q in range(TOTAL_ROWS):
+            for q in range(MIXED_TOTAL_ROWS):
                 totals[tile, q] = 0.0
             totals[tile, LEAST_C2] = NO_C2
         low = scratch[0]

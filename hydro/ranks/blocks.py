@@ -140,6 +140,13 @@ class Blocks(list[Block]):
     def collect(self) -> None:
         """All blocks are whole here after this, if this is the first rank."""
 
+    def share(self) -> None:
+        """All blocks are whole on every rank after this, which all call in one step."""
+
+    def make_for(self, blocks: Sequence[Block]) -> Blocks:
+        """Who computes what of other blocks, whole on every rank, from within a step on."""
+        return Blocks(blocks, self.workers)
+
 
 def _give_or_raise(rows: Table, failure: RunFailure | None) -> Table:
     if failure is not None:

@@ -24,7 +24,6 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.interior.advance import TILE_ROWS, count_tiles
 from shockgrid.hydro.interior.update import sum_tiles
-from shockgrid.hydro.rows import TOTAL_ROWS
 
 MOST_UNCUT = 1.2  # times a rank's fair share: a block of more is cut
 GHOST_ROWS = 2  # of cells beyond a band, which its update reads
@@ -242,7 +241,8 @@ class CutBlock:
 
     def bring_failed(self) -> None:
         """Send the owner the new states of all cells, where they are not admissible."""
-        is_valid = self.is_owner and sum_tiles(self.block.totals.rows, np.empty(TOTAL_ROWS))
+        totals = self.block.totals
+        is_valid = self.is_owner and sum_tiles(totals.rows, np.empty(totals.array.size))
         if not self.group.bcast(is_valid, root=0):
             self.gather_rows(self.block.state_new)
 

@@ -36,10 +36,10 @@ from shockgrid.hydro.ranks.cutting import (
     Piece,
     Rows,
     count_tile_rows,
+    distribute_blocks,
     divide_evenly,
     find_bounds,
 )
-from shockgrid.hydro.rows import TOTAL_ROWS
 from shockgrid.regrid.errors import RunFailure
 
 STEP, COLLECT, COUNT, END = range(4)  # what the first rank tells the others to do
@@ -55,7 +55,8 @@ class Ranks(Blocks):
     `Isend` and `Irecv`.
 
     places: the ranks of each block, its owner first (`hydro.ranks.cutting`); bounds: of their
-    bands, as rows of cells; left out: nearly as many rows for each.
+    bands, as rows of cells; left out: nearly as many rows for each; book: goes on to count the
+    messages, None: from nothing.
     """
 
     def __init__(
@@ -64,9 +65,10 @@ class Ranks(Blocks):
         blocks: Sequence[Block],
         places: Sequence[tuple[int, ...]],
         bounds: Sequence[Sequence[int]] | None = None,
+        book: messages.Book | None = None,
     ):
         super().__init__(blocks)
-        self.book = messages.Book(comm)
+        self.book = book or messages.Book(comm)
         self.comm = self.book.count("rows")
         self.places = list(places)
         self.rank = int(comm.rank)
@@ -136,7 +138,7 @@ class Ranks(Blocks):
                         for name in blocks[number].held_arrays
                     ]
                     items.append(messages.Item(number, rank, parts))
-            sums = [(_get_sums, np.arange(TOTAL_ROWS))]
+            sums = [(_get_sums, np.arange(blocks[number].totals.array.size))]
             new.append(messages.Item(number, there[0], sums, STATE_ROW))
             now.append(messages.Item(number, there[0], sums))
         comm = self.book.count("states")
@@ -289,6 +291,21 @@ class Ranks(Blocks):
                         comm.Send(plane, dest=0, tag=tag)
         self.busy = False
         self.whole = True
+
+    def share(self) -> None:
+        comm = self.book.count("whole blocks")
+        for number in range(len(self)):
+            for rank, _, name, rows in self._list_kept(number):
+                array = getattr(self[number], name)
+                band = array.reshape(-1, *array.shape[-2:])[:, slice(*rows)]
+                band[...] = comm.bcast(band.copy() if rank == self.rank else None, root=rank)
+
+    def make_for(self, blocks: Sequence[Block]) -> Ranks:
+        shares = distribute_blocks([(block.ni, block.nj) for block in blocks], self.size)
+        ranks = Ranks(self.book.comm, blocks, *shares, book=self.book)
+        ranks.busy = True
+        ranks.whole = False
+        return ranks
 
     def count(self) -> dict[str, Any]:
         """What all ranks have said and heard; see `hydro.ranks.messages.Book.gather`."""

@@ -45,9 +45,14 @@ class World:
     def __init__(self, comm: Any):
         self.comm = comm
         self.size = int(comm.size)
-        self.ranks: Ranks | None = None
+        self._flow: Simulation | None = None  # when all ranks compute it
         self._beginning = False
         self._sent: str | None = None  # the deck that all ranks build
+
+    @property
+    def ranks(self) -> Ranks | None:
+        """Who computes what now; others from when a flow has other blocks."""
+        return None if self._flow is None else get_ranks(self._flow)
 
     def build(self, deck: ReadDeck) -> None:
         """Let the other ranks build the evolution of a checked deck, while this one does so.
@@ -82,7 +87,7 @@ class World:
         self.build(deck)
         self._beginning = True
         tell(self.comm, BEGIN_MESSAGE)
-        _, self.ranks = distribute_flow(self.comm, evolution, shares, state)
+        self._flow = distribute_flow(self.comm, evolution, shares, state)
         self._beginning = False
         return describe_distribution([block.name for block in evolution.blocks], shares, self.size)
 
@@ -100,9 +105,8 @@ class World:
 
 def distribute_flow(
     comm: Any, built: Any, shared: Distribution | None = None, state: State = EMPTY
-) -> tuple[Simulation, Ranks]:
-    """An evolution that each rank has built, with the first one's state, and the ranks that share
-    it.
+) -> Simulation:
+    """An evolution that each rank has built, with the first one's state, shared by the ranks.
 
     shared, state: what the first rank says; state: its own, empty where all have the same.  Raises
     what has failed in building it here alone.
@@ -120,7 +124,15 @@ def distribute_flow(
     machines = comm.allgather(platform.node())
     beside = machines.count(platform.node())  # ranks that share the processors of a machine
     built.use_ranks(ranks, max(1, min(count_processors(), (os.cpu_count() or 1) // beside)))
-    return built, ranks
+    return built
+
+
+def get_ranks(flow: Simulation) -> Ranks:
+    """The ranks that share a flow now; raises TypeError where none do."""
+    ranks = flow.motion.blocks
+    if not isinstance(ranks, Ranks):
+        raise TypeError("no ranks share this flow")
+    return ranks
 
 
 def describe_ranks(world: World | None, note: Callable[[str], None]) -> list[str]:
@@ -203,7 +215,7 @@ def follow(comm: Any, screen: TextIO) -> int:
             word, code = hear(comm)
         if word == END:
             return code
-        evolution, ranks = distribute_flow(comm, built)
+        evolution = distribute_flow(comm, built)
         while True:
             word, code = hear(comm)
             if word == END:
@@ -212,9 +224,9 @@ def follow(comm: Any, screen: TextIO) -> int:
                 with contextlib.suppress(RunFailure):  # agreed on by all ranks
                     Simulation.advance(evolution)  # what a problem adds is for the first rank
             elif word == COLLECT:
-                ranks.collect()
+                evolution.collect()
             elif word == COUNT:
-                ranks.count()
+                get_ranks(evolution).count()
     except BaseException as error:
         code = (
             EXIT_BAD_INPUT if isinstance(error, BadInput | MemoryError | OSError) else EXIT_INTERNAL

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builders import check_budget, check_restarts, march_measured, tensor
+from builders import check_budget, check_restarts, get_bits, march, march_measured, tensor
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.eos import IdealGas
+from shockgrid.problems.deck import RunControl
 from shockgrid.problems.initial_states import Fluid
 from shockgrid.problems.interface_instability.deck import InterfaceDeck, LineMotion
 from shockgrid.problems.interface_instability.line import Mode
@@ -19,6 +20,7 @@ from shockgrid.problems.interface_instability.zone import (
 )
 from shockgrid.regrid.errors import BadInput, RunFailure
 from shockgrid.regrid.measure.corners import compute_centres
+from thread_ranks import compare_with_ranks
 
 STEEP = {"mach": 1.5, "modes": [Mode(ka0=0.5)]}
 
@@ -122,13 +124,37 @@ def test_a_run_goes_on_where_its_line_ends():
     assert row["t"] > 0.0 and np.isfinite(problem.measure(flow)["amplitude"])
 
 
-def fail_once(check):
-    """A check that finds the line torn, the first time."""
-    left = [RunFailure("lines: the line is torn", cause="line-torn")]
+@pytest.mark.parametrize("keys", [{"handover_kct": -0.8}, {"handover": True}])
+def test_ranks_and_threads_hand_over_with_the_same_bits(keys):
+    problem = make_problem(cells=16, kct_end=4.0, width=1.0, sides="periodic", **keys)
+
+    def build():
+        flow = problem.build()
+        if "handover" in keys:
+            flow._check_collapse = fail_once(flow._check_collapse, after=12)
+        return flow
+
+    rows = compare_with_ranks(build, 30, [2, 3])
+    handed = [row["handover"] for row in rows if row["handover"]]
+    assert handed == ["time" if "handover_kct" in keys else "line-torn"]
+    run = RunControl(cfl=0.8, threads=2)
+    parallel = make_problem(cells=16, kct_end=4.0, width=1.0, sides="periodic", run=run, **keys)
+    alone = build()
+    problem = parallel
+    other = build()
+    march(alone, 30)
+    march(other, 30)
+    assert get_bits(alone) == get_bits(other)
+
+
+def fail_once(check, after=0):
+    """A check that finds the line torn once, after so many calls that find nothing."""
+    left = [None] * after + [RunFailure("lines: the line is torn", cause="line-torn")]
 
     def fail():
-        if left:
-            raise left.pop()
+        failure = left.pop(0) if left else None
+        if failure is not None:
+            raise failure
         check()
 
     return fail

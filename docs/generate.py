@@ -235,9 +235,15 @@ def fill_verify(arguments: str) -> list[str]:
                 leading[record["problem"]] = record
         return make_table(HEADS[:5], [format_record(record)[:5] for record in leading.values()])
     names = arguments.split()
-    first = 0 if len(names) > 1 else 1
-    rows = [format_record(record)[first:] for record in records if record["problem"] in names]
-    return make_table(HEADS[first:], rows)
+    shown = [head for head in HEADS if head not in ("met", "CPU s")]
+    if len(names) == 1:
+        shown.remove("problem")
+    rows = []
+    for record in records:
+        if record["problem"] in names:
+            cells = dict(zip(HEADS, format_record(record), strict=True))
+            rows.append([cells[head] for head in shown])
+    return make_table(shown, rows)
 
 
 def fill_output(arguments: str) -> list[str]:

@@ -27,7 +27,7 @@ from shockgrid.hydro import phases
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos import EquationOfState, IdealGas, MieGruneisen
-from shockgrid.hydro.history import PHASES
+from shockgrid.hydro.history import TIMED_PARTS
 from shockgrid.hydro.links import join
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.regrid.errors import BadInput
@@ -232,7 +232,7 @@ def measure_flow(tables: Tables, cells: int, rounds: int, peer: Peer | None) -> 
             found = time_rounds(call, count, times, rounds, peer)
             tables.add("flow", case=f"{name}, {cells}²", what=what, **found)
         row = moving.advance()
-        parts = {part: row[f"seconds_{part}"] for part in PHASES}
+        parts = {part: row[f"seconds_{part}"] for part in TIMED_PARTS}
         shares = {f"{part}, %": 100.0 * v / sum(parts.values()) for part, v in parts.items()}
         arrays = [v for b in fixed.blocks for v in vars(b).values() if isinstance(v, np.ndarray)]
         held = round(sum(a.nbytes for a in arrays) / cells**2)

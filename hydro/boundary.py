@@ -149,9 +149,9 @@ class Segment:
         """Velocity of the nodes of a segment with given motion [m/s]."""
         return 0.0, 0.0
 
-    def has(self, phase: str) -> bool:
-        """Whether the kind fills its ghosts, speeds or fluxes itself."""
-        return getattr(type(self), phase) is not getattr(Segment, phase)
+    def overrides(self, method: str) -> bool:
+        """Whether its kind fills its ghosts, speeds or fluxes itself, by this method."""
+        return getattr(type(self), method) is not getattr(Segment, method)
 
     def fill_ghosts(self, t: float) -> None:
         """Write the ghosts beyond the segment from the states at time t; links do for theirs."""
@@ -265,9 +265,9 @@ class Inflow(Segment):
         values = read_values(f"{self}: inflow segment", block.carried_fields, carried)
         self._carried = values[:, None]
         self.state = state if callable(state) else (lambda t: state)
-        # the rows beyond keep it
-        self._is_steady = not callable(state)
-        self._filled = False
+        # a constant state is written once: nothing else writes to the rows beyond
+        self._is_constant = not callable(state)
+        self._is_written = False
         self.check_numbers(self.state(0.0), ("rho", "u", "v", "p"), "state")
         self._velocity = 0.0, 0.0
         if velocity is not None:
@@ -291,9 +291,9 @@ class Inflow(Segment):
 
     def fill_speeds(self, t):
         """The state beyond at mid-time, for the flux."""
-        if self._is_steady and self._filled:
+        if self._is_constant and self._is_written:
             return
-        self._filled = True
+        self._is_written = True
         rim = self.rim
         eos = self.block.eos.with_fields(self._carried[:, 0])
         rho, u, v, p = self.state(t)
@@ -379,10 +379,10 @@ class FreeSurface(Segment):
     def fill_flux(self, t):
         self._fill(t, AT_FLUX)
 
-    def _fill(self, t: float, phase: int) -> None:
+    def _fill(self, t: float, stage: int) -> None:
         block = self.block
         fill_free_surface(
-            block.rim.rows, self.spans, block.wave_law, self.pressure(t), phase,
+            block.rim.rows, self.spans, block.wave_law, self.pressure(t), stage,
             block.geometry.curved,
         )  # fmt: skip
 

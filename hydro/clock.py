@@ -43,37 +43,37 @@ class Clock:
     def choose_dt(self) -> tuple[float, str]:
         """The next step and what limits it.  Theory F7.1."""
         dt = self.cfl / self.rate
-        limit = "sound"
+        dt_limit = "sound"
         if self.stretch_rate * dt > MOST_STRETCHING:
             dt = MOST_STRETCHING / self.stretch_rate
-            limit = "stretching"
+            dt_limit = "stretching"
         if dt > self.tension_dt:
             dt = self.tension_dt
-            limit = "tension"
+            dt_limit = "tension"
         # the first steps are parts of the stable one, whatever limits that
         if self.step < len(START_FACTORS):
             dt = dt * START_FACTORS[self.step]
-            limit = "start"
+            dt_limit = "start"
         if dt > self.retry_dt:
             dt = self.retry_dt
-            limit = "retry"
+            dt_limit = "retry"
         # two equal steps to the end rather than a long one and a tiny one
         time_left = self.t_end - self.t
         if dt >= time_left:
             dt = time_left
-            limit = "t_end"
+            dt_limit = "t_end"
         elif 2.0 * dt > time_left:
             dt = 0.5 * time_left
-            limit = "t_end"
-        return dt, limit
+            dt_limit = "t_end"
+        return dt, dt_limit
 
     def compute_fraction(self, dt: float) -> float:
         """dt over the stable step."""
         return dt * self.rate / self.cfl
 
-    def tick(self, dt: float, limit: str, rate: float, stretching: float) -> bool:
+    def tick(self, dt: float, dt_limit: str, rate: float, stretching: float) -> bool:
         """Add an accepted step of length dt; returns whether it was the last."""
-        self.retry_dt = STEP_RECOVERY * dt if limit == "retry" else np.inf
+        self.retry_dt = STEP_RECOVERY * dt if dt_limit == "retry" else np.inf
         last = dt >= self.t_end - self.t
         self.t = self.t_end if last else self.t + dt
         self.dt = dt
@@ -103,7 +103,7 @@ class Clock:
         self.stretch_rate = float(state["clock/stretch_rate"])
 
 
-class Phase:
+class TimedPart:
     """A block of code whose wall seconds are added up, but for those of compiling kernels."""
 
     __slots__ = ("begun", "seconds")
@@ -120,21 +120,21 @@ class Phase:
 
 
 class Stopwatch:
-    """Adds up wall seconds by phase: `with watch("flow"): ...`."""
+    """Adds up wall seconds of the parts of a step: `with stopwatch("flow"): ...`."""
 
     def __init__(self):
-        self.phases: dict[str, Phase] = {}
+        self.parts: dict[str, TimedPart] = {}
 
-    def __call__(self, phase: str) -> Phase:
-        """The phase of that name, to be timed by `with`."""
-        timed = self.phases.get(phase)
+    def __call__(self, part: str) -> TimedPart:
+        """The part of that name, to be timed by `with`."""
+        timed = self.parts.get(part)
         if timed is None:
-            timed = self.phases[phase] = Phase()
+            timed = self.parts[part] = TimedPart()
         return timed
 
-    def take(self, phases: tuple[str, ...]) -> dict[str, float]:
-        """Seconds of the phases since the last call, as history columns."""
-        seconds = {f"seconds_{phase}": self(phase).seconds for phase in phases}
-        for phase in self.phases.values():
-            phase.seconds = 0.0
+    def take(self, parts: tuple[str, ...]) -> dict[str, float]:
+        """Seconds of the parts since the last call, as history columns."""
+        seconds = {f"seconds_{part}": self(part).seconds for part in parts}
+        for timed in self.parts.values():
+            timed.seconds = 0.0
         return seconds

@@ -16,7 +16,7 @@ from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.quality import measure_worst
 from shockgrid.regrid.plug_ins import PlugIns
 
-PHASES = ("sides", "regrid", "flow")
+TIMED_PARTS = ("sides", "regrid", "flow")
 
 ColumnGroup = Callable[[Flow], dict[str, float | int]]
 
@@ -112,7 +112,7 @@ COLUMNS: dict[str, ColumnGroup] = {
     "contacts": lambda flow: flow.meetings.compute_row() if flow.meetings.pairs else {},
     "special-cells": count_special_cells,
     "step-limit": find_step_limit,
-    "seconds": lambda flow: flow.watch.take(PHASES),
+    "seconds": lambda flow: flow.stopwatch.take(TIMED_PARTS),
 }
 
 

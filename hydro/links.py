@@ -96,19 +96,19 @@ class Link:
         """Nodes of the leader's line in the follower's order and position."""
         return (line + self.shift[:, None])[:, :: -1 if self.reverse else 1]
 
-    def solve(self, phase: int, dt: float) -> None:
-        """Contact states of both sides in a phase of `hydro.perimeter.contacts`, with ghosts
+    def solve(self, stage: int, dt: float) -> None:
+        """Contact states of both sides in a stage of `hydro.perimeter.contacts`, with ghosts
         AT_CELLS and fluxes AT_FLUX; for a seam only these."""
         curved = self.leader.block.geometry.curved
         if not self.passes_mass:
             speeds, closed = self.layer
             layer = speeds, self.reverse, closed
-            solve_link.entry(*self._rims, *self._wave_laws, layer, phase, curved)
-        elif phase != AT_TRACES:
-            pass_seam(*self._rims, phase, curved)
+            solve_link.entry(*self._rims, *self._wave_laws, layer, stage, curved)
+        elif stage != AT_TRACES:
+            pass_seam(*self._rims, stage, curved)
         if self._sticking is not None:
             one, other, pairs = self._sticking
-            stick_together(one, other, pairs, phase, self.passes_mass, curved)
+            stick_together(one, other, pairs, stage, self.passes_mass, curved)
 
     def copy_line_to_follower(self) -> None:
         """Copy the leader's new nodes to the follower."""
@@ -189,9 +189,9 @@ class Exchange:
         """Contact states from the traces between both grids, and the fluxes of both sides."""
         self._solve(AT_FLUX, dt)
 
-    def _solve(self, phase: int, dt: float) -> None:
+    def _solve(self, stage: int, dt: float) -> None:
         for link in self.all:
-            link.solve(phase, dt)
+            link.solve(stage, dt)
 
     def accept(self) -> None:
         """Accept the step."""

@@ -110,6 +110,12 @@ def update(block: Block, dt: float, threads: int = 1) -> None:
         fill_polygons(block)
 
 
+def measure_rates(block: Block) -> None:
+    """Rates and totals of a state that no step has made: those after an update over no time."""
+    update(block, dt=0.0)
+    block.rates[...] = block.rates_new
+
+
 def fill_polygons(block: Block) -> None:
     """Add the parts of polygon cells beyond their straight faces to the new state."""
     excess = block.excess_volume, block.excess_volume_new

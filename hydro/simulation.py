@@ -162,7 +162,7 @@ class Simulation:
             thickness = [contact.thickness for contact in self.motion.sides.thick_contacts]
             self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
         self.ledger = Ledger(blocks)
-        self.watch = Stopwatch()
+        self.stopwatch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
         if not is_interpreting():  # built to be looked at, it needs no rates and totals
@@ -215,8 +215,7 @@ class Simulation:
     def _update_rates(self) -> None:
         """Rates and totals of states that no step has made."""
         for block in self._blocks:
-            phases.update(block, 0.0)
-            block.rates[...] = block.rates_new
+            phases.measure_rates(block)
 
     def _make_flow(self) -> None:
         self._flow = Flow(
@@ -230,7 +229,7 @@ class Simulation:
             self.ledger,
             self.clock,
             self.small_cells,
-            self.watch,
+            self.stopwatch,
         )
 
     @property
@@ -324,7 +323,7 @@ class Simulation:
         elif self.handover is not None and self.handover.is_due(clock.t):
             self.hand_over()
             self._handed_over = AT_ITS_TIME
-        row = self.compute_row(record.limit, record.retries)
+        row = self.compute_row(record.dt_limit, record.retries)
         self._handed_over = ""
         self._note_end()  # within the step: every rank has what it reads
         self._shared.end_step()
@@ -448,13 +447,13 @@ class Simulation:
         It names the reason for which longer steps were rejected, or the cell with the largest rate.
         """
         clock = self.clock
-        dt, limit = clock.choose_dt()
+        dt, dt_limit = clock.choose_dt()
         can_hand_over = self.handover is not None and self.handover.first_nodes is None
         least_part = LEAST_STEP_PART_BEFORE_HANDOVER if can_hand_over else LEAST_STEP_PART
-        if dt >= least_part * clock.first_stable_dt or limit in ("t_end", "start"):
+        if dt >= least_part * clock.first_stable_dt or dt_limit in ("t_end", "start"):
             return
         when = f"t = {clock.t:.6g} s (step {clock.step})"
-        if limit == "retry" and self.last_reason:
+        if dt_limit == "retry" and self.last_reason:
             raise self.last_reason.tell(
                 f"{self.last_reason}, {when}; only steps down to {dt:.3g} s were possible at last",
                 RunFailure,
@@ -484,12 +483,12 @@ class Simulation:
         row = self.compute_row("start", 0)
         return {name: row[name] for name in row if name.startswith(START_COLUMNS)}
 
-    def compute_row(self, limit: str, retries: int) -> dict:
+    def compute_row(self, dt_limit: str, retries: int) -> dict:
         """The history row of the current state."""
         row = {
             "t": self.clock.t,
             "dt": self.clock.dt,
-            "dt_limit": limit,
+            "dt_limit": dt_limit,
             "retries": retries,
             **compute_columns(self._flow),
         }

@@ -89,7 +89,7 @@ class Flow:
     ledger: Ledger
     clock: Clock
     small_cells: SmallCells
-    watch: Stopwatch
+    stopwatch: Stopwatch
 
     @property
     def voids(self) -> Voids:
@@ -107,7 +107,7 @@ class StepRecord:
     """How a step went: what limited it, how often and why it was retried, and whether it is the
     last."""
 
-    limit: str = ""
+    dt_limit: str = ""
     retries: int = 0
     reason: RunFailure | None = None
     last: bool = False
@@ -130,13 +130,13 @@ def take_step(flow: Flow) -> StepRecord:
     for block in flow.blocks:
         block.kernels.use_first_order(False)
     # 1 dt from the largest rate of all blocks; halved for as long as the step fails
-    dt, record.limit = flow.clock.choose_dt()
+    dt, record.dt_limit = flow.clock.choose_dt()
     first_dt = dt
     while outcome := try_step(flow, dt):
         if isinstance(outcome, Touch):
             dt = outcome.dt
             first_dt = dt
-            record.limit = "touch"
+            record.dt_limit = "touch"
             continue
         record.reason = outcome
         record.retries += 1
@@ -150,7 +150,7 @@ def take_step(flow: Flow) -> StepRecord:
             dt = first_dt
         else:
             dt = 0.5 * dt
-        record.limit = "retry"
+        record.dt_limit = "retry"
     accept_step(flow, dt, record)
     return record
 
@@ -181,8 +181,8 @@ def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
             touch = move_lines(flow, dt, fraction)
         if touch is not None:
             return touch
-        with flow.watch("regrid"):
-            # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
+        # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
+        with flow.stopwatch("regrid"):
             flow.motion.regrid(fraction)
         update_states(flow, dt)
     except RegridFailure as failure:
@@ -203,7 +203,7 @@ def agree_on_failures(motion: GridMotion, fraction: float) -> Iterator[None]:
 def fill_states_beyond(flow: Flow, dt: float) -> None:
     """Phase 2: what lies beyond all sides, and the cells along them at mid-time."""
     t = flow.clock.t
-    with flow.watch("sides"):
+    with flow.stopwatch("sides"):
         # 2 states beyond all sides; slopes and mid-time states of the cells along them
         flow.exchange.divide_contacts()  # sliding contacts: both lines divided into pieces
         flow.source.start_step(t, dt)  # first half of gravity and heating
@@ -217,7 +217,7 @@ def fill_states_beyond(flow: Flow, dt: float) -> None:
 
 def find_contact_speeds(flow: Flow, dt: float) -> None:
     """Phase 3: contact states at the faces of moving lines, and so their velocities."""
-    with flow.watch("sides"):
+    with flow.stopwatch("sides"):
         # 3 contact speeds of all sides that move with the flow, from traces at mid-time
         for coupling in flow.couplings:
             coupling.fill_speeds(flow.clock.t + 0.5 * dt, dt)
@@ -225,8 +225,9 @@ def find_contact_speeds(flow: Flow, dt: float) -> None:
 
 def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
     """Phase 4; the shorter step, if surfaces come to touch within this one."""
-    with flow.watch("regrid"):
-        # 4 nodes along the sides moved; surfaces that have come to touch laid on each other
+    # 4 nodes along the sides moved; surfaces that have come to touch laid on each other.
+    # History: motion of the sides and regridding are one column
+    with flow.stopwatch("regrid"):
         move_sides(flow.motion, StepTime(flow.clock.t, dt, fraction))
         shorter = flow.meetings.meet(dt, dt / fraction)
     return None if shorter is None else Touch(shorter)
@@ -234,13 +235,13 @@ def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
 
 def update_states(flow: Flow, dt: float) -> None:
     """Phase 6: fluxes through the moved faces, and the new states."""
-    with flow.watch("sides"):
+    with flow.stopwatch("sides"):
         # 6 fluxes through the sides, from traces on the moved faces
         for block in flow.blocks:
             phases.trace(block, dt)  # with the fluxes of walls and open sides
         for coupling in flow.couplings:
             coupling.fill_fluxes(flow.clock.t + 0.5 * dt, dt)
-    with flow.watch("flow"):
+    with flow.stopwatch("flow"):
         # then the inside: slopes, traces, swept volumes, fluxes, new states; small cells share
         flow.blocks.update(dt)
         if flow.blocks.solid_pieces:
@@ -288,4 +289,4 @@ def accept_step(flow: Flow, dt: float, record: StepRecord) -> None:
     flow.ledger.add_boundary(dt)
     flow.ledger.count_energy_of_voids(flow.voids.work, flow.voids.energy_left)
     rate = flow.small_cells.find_rate()
-    record.last = flow.clock.tick(dt, record.limit, rate, flow.motion.sides.stretching)
+    record.last = flow.clock.tick(dt, record.dt_limit, rate, flow.motion.sides.stretching)

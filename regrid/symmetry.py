@@ -35,7 +35,7 @@ class Turn(NamedTuple):
         """Whether it turns a block that goes anticlockwise into one that goes clockwise."""
         return self.i != self.j
 
-    def exchange(self) -> Turn:
+    def transpose(self) -> Turn:
         """The same turn where i and j are exchanged."""
         return Turn(self.j, self.i)
 

@@ -1,6 +1,6 @@
-"""One second-order step of a block: rows go through all phases while they are in cache.
+"""One second-order step of a block: rows go through all kernels while they are in cache.
 
-`make_flow_kernels` binds an equation of state and a limiter to the row phases and returns the
+`make_flow_kernels` binds an equation of state and a limiter to the row kernels and returns the
 kernel that advances a whole block.  The block is divided into tiles whose size does not depend on
 the number of threads.  Each tile reconstructs one more row on either side, and sums are reduced
 tile by tile in order, so results are bitwise the same for any number of threads.  The scheme:
@@ -30,8 +30,9 @@ from shockgrid.hydro.interior.faces import (
     make_traces,
     make_upwind,
 )
-from shockgrid.hydro.interior.reconstruction import make_row_phases
+from shockgrid.hydro.interior.reconstruction import make_row_kernels
 from shockgrid.hydro.interior.scratch import (
+    CELL_BELOW,
     SCRATCH_SPAN,
     copy_back,
     copy_row,
@@ -49,6 +50,7 @@ from shockgrid.hydro.rows import (
     FIRST_ORDER,
     FLUX_ROWS,
     LEAST_C2,
+    NO_C2,
     STATE_ROWS,
     TOTAL_ENERGY,
     TOTAL_MASS,
@@ -122,7 +124,7 @@ def find_tile(number, ni, nj):
 def clear_sums(Z):
     """Sums and extremes of a tile's columns before its first row."""
     for k in range(SCRATCH_SPAN):
-        Z[scratch.LEAST_C2 + k] = 1e300
+        Z[scratch.LEAST_C2 + k] = NO_C2
         Z[scratch.FIRST_ORDER + k] = 0.0
         Z[scratch.SUM_MASS + k] = 0.0
         Z[scratch.SUM_X + k] = 0.0
@@ -135,7 +137,7 @@ def clear_sums(Z):
 @compiled_once(allocates=False)
 def sum_columns(Z, tile, totals):
     """Totals (8,) of a tile, from the sums of its columns; columns as in `hydro.rows`."""
-    least = 1e300
+    least = NO_C2
     for q in range(TOTAL_ROWS):
         totals[q] = 0.0
     for k in range(tile.first_entry, tile.stop_entry):
@@ -177,7 +179,7 @@ def make_flow_kernels(
     low_mach = limiter in LOW_MACH
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
-    measure_after, next_row, reconstruct, _ = make_row_phases(
+    measure_after, next_row, reconstruct, _ = make_row_kernels(
         eos_class, limiter, geometry, flux, is_solid
     )
     fill_faces_i = make_faces(geometry.face, scratch.X_HIGH, scratch.X_HIGH + 1, scratch.AREA_X_I)
@@ -188,14 +190,18 @@ def make_flow_kernels(
     fill_traces_in, fill_traces = make_traces(sound, opens_voids, is_solid)
     pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
     i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
-    j_faces = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
+    j_faces = scratch.RHO_UP + CELL_BELOW, scratch.RHO_DOWN, scratch.AREA_X_J
     force_i, force_j = (scratch.STRESS_I, scratch.STRESS_J) if is_solid else (0, 0)
     choice = low_mach, opens_voids
     fill_upwind_i = make_upwind(
         *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, *choice, force_i
     )
     fill_upwind_j = make_upwind(
-        *j_faces, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1, *choice, force_j
+        *j_faces,
+        scratch.VOIDED_ENERGY + CELL_BELOW,
+        scratch.ACOUSTIC + CELL_BELOW,
+        *choice,
+        force_j,
     )
     voids = opens_voids, make_leaving_part(eos_class)
     fill_flux_i = make_flux(
@@ -216,7 +222,7 @@ def make_flow_kernels(
     use_hll_j = make_hll_flux(
         energy,
         j_faces,
-        (scratch.HLL - 1, scratch.VOIDED_ENERGY - 1),
+        (scratch.HLL + CELL_BELOW, scratch.VOIDED_ENERGY + CELL_BELOW),
         scratch.FLUX_J_MASS,
         pressure_j,
         *voids,
@@ -235,7 +241,7 @@ def make_flow_kernels(
     add_shear_flux_j = make_shear_flux(
         j_faces,
         (scratch.X_HIGH, scratch.X_LOW),
-        (scratch.SHEAR - 1, scratch.SHEAR),
+        (scratch.SHEAR + CELL_BELOW, scratch.SHEAR),
         scratch.STRESS_J,
         scratch.FLUX_J_MASS,
         scratch.SPEED_J_X,
@@ -399,7 +405,8 @@ def make_flow_kernels(
                     copy_rows_back(Z, source, count, solid.speed_i, row, first_j)
             if keeps_masses and row >= tile.first_row:
                 copy_back(Z, scratch.FLUX_I_MASS + entry, count, mass_i, row, first_j)
-            # the other traces; faces towards +i replace those towards -i, whose fluxes are known
+            # traces towards +i, -j and +j; the faces towards +i take the rows of those towards -i,
+            # whose fluxes are known by now
             if row < tile.stop_row:
                 fill_faces_i(Z, whole, inverse_dt)
                 fill_faces_j(Z, padded, inverse_dt)
@@ -428,7 +435,7 @@ def make_flow_kernels(
                         Z[scratch.FLUX_J_MASS + q * SCRATCH_SPAN + tile.stop_entry] = outward
                 if keeps_masses:
                     copy_back(Z, scratch.FLUX_J_MASS + entry, count + 1, mass_j, row, first_j)
-            # the row before gets its new state, this one its fluxes
+            # new state of the row before, whose fluxes are complete; this row's first ones are kept
             if is_own and row > tile.first_row:
                 update_rows(Z, whole, dt, inverse_dt, parameters)
             elif is_own:

@@ -1,4 +1,4 @@
-"""The phases of one flow step on one row of cells that occur only in axisymmetric flow.
+"""The kernels of one step on a row of cells that occur only in axisymmetric flow.
 
 They compute the offsets of the centres of volume along the grid lines and the resulting rotation,
 the smoothness of the pressure, and the radial force of the pressure, per depth and as the tension
@@ -10,7 +10,6 @@ from __future__ import annotations
 from shockgrid.hydro.formulas.geometry import compute_centre_offset, lean_lines
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
 from shockgrid.hydro.interior import scratch
-from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
 
 # jumps of the pressure over rho c² between neighbours, up to which flow is smooth, and from which
@@ -74,7 +73,7 @@ def move_shifts(Z, n):
 @inlined
 def compute_plane_area_y(Z, a, b):
     """Radial normal per depth of a face at mid-time; places of x of its nodes, new ones follow."""
-    return 0.5 * ((Z[a] - Z[b]) + (Z[a + 2 * SCRATCH_SPAN] - Z[b + 2 * SCRATCH_SPAN]))
+    return 0.5 * ((Z[a] - Z[b]) + (Z[a + scratch.TO_X_NEW] - Z[b + scratch.TO_X_NEW]))
 
 
 @compiled_once(allocates=False)
@@ -92,12 +91,14 @@ def fill_lines(Z, n):
 
 
 def make_push(split, pressure_row, flux_row, node_row_a, node_row_b, area_row, push_row):
-    """Phase that takes the pressure out of the radial momentum of a row of faces: `Geometry.split`.
+    """Make the kernel that takes the pressure out of the radial momentum of a row of faces.
 
     Scratch offsets: `pressure_row` in the fluxes; `flux_row`: of radial momentum; `node_row_a`,
     `node_row_b`: x of the nodes at a face's ends, as in `hydro.interior.faces.make_faces`;
     `area_row`: the normals' y; `push_row`: what is filled, and the row after it.
     """
+
+    hoop_row = push_row + scratch.SCRATCH_SPAN
 
     @compiled_once(allocates=False)
     def fill_push(Z, n):
@@ -109,7 +110,7 @@ def make_push(split, pressure_row, flux_row, node_row_a, node_row_b, area_row, p
             )
             Z[flux_row + k] = momentum_y
             Z[push_row + k] = force
-            Z[push_row + SCRATCH_SPAN + k] = hoop
+            Z[hoop_row + k] = hoop
 
     return fill_push
 
@@ -147,7 +148,7 @@ def find_mean(Z, rows, k):
 
 
 def make_source_pressure(sound_speed_squared_part):
-    """Phase that fills the pressure of the geometric source of a row's cells."""
+    """Make the kernel that fills the pressure of the geometric source of a row's cells."""
 
     @compiled_once(allocates=False)
     def fill_source_pressure(Z, n, parameters):

@@ -13,16 +13,15 @@ from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.formulas.reconstruction import WHOLE_CELL_MARK, choose_own, compute_face_state
 from shockgrid.hydro.formulas.strength import compute_shear_contact
 from shockgrid.hydro.interior import scratch
-from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.regrid.jit import compiled_once, inlined
 
 
 def make_faces(compute_face, node_row_a, node_row_b, target_row):
-    """Phase that fills normal times area, swept volume per time and centre of a row of faces.
+    """Make the kernel that fills normal times area, swept volume per time and centre of faces.
 
     `compute_face`: `Geometry.face`; `node_row_a`, `node_row_b`: scratch offsets of x of the nodes
     at a face's ends, its normal to the right of the way from a to b (y, and the new x and y follow
-    in the next rows); `target_row`: offset of the normal's x.  Offsets are constants of the phase:
+    in the next rows); `target_row`: offset of the normal's x.  Offsets are constants of the kernel:
     the vectoriser needs to know them.
     """
 
@@ -30,28 +29,28 @@ def make_faces(compute_face, node_row_a, node_row_b, target_row):
     def fill_faces(Z, n, inverse_dt):
         """Faces at mid-time (theory F3.1)."""
         for k in range(1, n + 1):
-            a = Z[node_row_a + k], Z[node_row_a + SCRATCH_SPAN + k]
-            b = Z[node_row_b + k], Z[node_row_b + SCRATCH_SPAN + k]
+            a = Z[node_row_a + k], Z[node_row_a + scratch.TO_Y + k]
+            b = Z[node_row_b + k], Z[node_row_b + scratch.TO_Y + k]
             a_new = (
-                Z[node_row_a + 2 * SCRATCH_SPAN + k],
-                Z[node_row_a + 3 * SCRATCH_SPAN + k],
+                Z[node_row_a + scratch.TO_X_NEW + k],
+                Z[node_row_a + scratch.TO_Y_NEW + k],
             )
             b_new = (
-                Z[node_row_b + 2 * SCRATCH_SPAN + k],
-                Z[node_row_b + 3 * SCRATCH_SPAN + k],
+                Z[node_row_b + scratch.TO_X_NEW + k],
+                Z[node_row_b + scratch.TO_Y_NEW + k],
             )
             area_x, area_y, sweep, x, y = compute_face(a, b, a_new, b_new, inverse_dt)
             Z[target_row + k] = area_x
-            Z[target_row + SCRATCH_SPAN + k] = area_y
-            Z[target_row + 2 * SCRATCH_SPAN + k] = sweep
-            Z[target_row + 3 * SCRATCH_SPAN + k] = x
-            Z[target_row + 4 * SCRATCH_SPAN + k] = y
+            Z[target_row + scratch.TO_AREA_Y + k] = area_y
+            Z[target_row + scratch.TO_SWEEP + k] = sweep
+            Z[target_row + scratch.TO_MIDDLE_X + k] = x
+            Z[target_row + scratch.TO_MIDDLE_Y + k] = y
 
     return fill_faces
 
 
 def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
-    """Phases that fill the traces of a row: towards -i, and towards +i, -j and +j.
+    """Make the kernels that fill the traces of a row: towards -i, and towards +i, -j and +j.
 
     is_solid: c² is that of longitudinal waves.
     """
@@ -84,8 +83,8 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
 
     @inlined
     def load(Z, k):
-        """What is traced: predicted state, gradients, own state and c², whether torn, what
-        shear adds to c², centre."""
+        """What is traced: predicted state, gradients, own state and c², energy if the cell
+        has failed (else WHOLE_CELL_MARK), what shear adds to c², centre."""
         return (
             (
                 Z[scratch.RHO_HALF + k],
@@ -157,14 +156,14 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
 
 
 def make_upwind(
-    left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids, force=0
+    left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids, stress_row=0
 ):
-    """Phase that chooses the upwind side of the contact at a row of faces: first half of HLLC.
+    """Make the kernel that chooses the upwind side of the contact at faces: first half of HLLC.
 
-    Scratch offsets of the densities traced on both sides, of the faces' normals and of the torn
-    energies and acoustic weights of the cells on the left.  `low_mach`: the limiter has acoustic
-    weights; `opens_voids`: the material has void energies; `force`: of a solid, the first row of
-    its stress on the faces.
+    Scratch offsets of the densities traced on both sides, of the faces' normals, and of the
+    energies of failed cells and the acoustic weights of the cells on the left.  `low_mach`: the
+    limiter has acoustic weights; `opens_voids`: the material has void energies; `stress_row`: of a
+    solid, the first row of its stress on the faces.
     """
 
     @compiled_once(allocates=False)
@@ -172,18 +171,18 @@ def make_upwind(
         """State and wave on the face's side of the contact, and what the contact's speed is."""
         for k in range(1, n + 1):
             rho_l = Z[left_row + k]
-            u_l = Z[left_row + SCRATCH_SPAN + k]
-            v_l = Z[left_row + 2 * SCRATCH_SPAN + k]
-            p_l = Z[left_row + 3 * SCRATCH_SPAN + k]
+            u_l = Z[left_row + scratch.TO_U + k]
+            v_l = Z[left_row + scratch.TO_V + k]
+            p_l = Z[left_row + scratch.TO_P + k]
             rho_r = Z[right_row + k]
-            u_r = Z[right_row + SCRATCH_SPAN + k]
-            v_r = Z[right_row + 2 * SCRATCH_SPAN + k]
-            p_r = Z[right_row + 3 * SCRATCH_SPAN + k]
+            u_r = Z[right_row + scratch.TO_U + k]
+            v_r = Z[right_row + scratch.TO_V + k]
+            p_r = Z[right_row + scratch.TO_P + k]
             area_x = Z[face_row + k]
-            area_y = Z[face_row + SCRATCH_SPAN + k]
+            area_y = Z[face_row + scratch.TO_AREA_Y + k]
             square = area_x * area_x + area_y * area_y
             w_l, w_r = riemann.compute_normal_speeds(
-                u_l, v_l, u_r, v_r, area_x, area_y, Z[face_row + 2 * SCRATCH_SPAN + k]
+                u_l, v_l, u_r, v_r, area_x, area_y, Z[face_row + scratch.TO_SWEEP + k]
             )
             if low_mach:
                 acoustic_l = Z[acoustic_row + k]
@@ -193,21 +192,21 @@ def make_upwind(
                 )
             s_l, s_r = riemann.compute_waves(
                 w_l,
-                Z[left_row + 4 * SCRATCH_SPAN + k],
+                Z[left_row + scratch.TO_C2 + k],
                 w_r,
-                Z[right_row + 4 * SCRATCH_SPAN + k],
+                Z[right_row + scratch.TO_C2 + k],
                 square,
             )
             left_stress = 0.0
             right_stress = 0.0
-            if force:
-                left_stress = Z[force + k]
-                right_stress = Z[force + 2 * SCRATCH_SPAN + k]
+            if stress_row:
+                left_stress = Z[stress_row + k]
+                right_stress = Z[stress_row + scratch.TO_NORMAL_RIGHT + k]
             push, drag, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l - left_stress, w_l, s_l), (rho_r, p_r - right_stress, w_r, s_r), square
             )
             from_left = push <= 0.0
-            if force:
+            if stress_row:
                 Z[scratch.STRESS_SIDE + k] = left_stress if from_left else right_stress
             s_l_cut = s_l if s_l < 0.0 else 0.0
             s_r_cut = s_r if s_r > 0.0 else 0.0
@@ -260,7 +259,7 @@ def make_flux(
     find_leaving_part=None,
     is_solid=False,
 ):
-    """Phase that turns the upwind sides of a row of faces into fluxes: second half of HLLC.
+    """Make the kernel that turns the upwind sides of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face_row`: the faces' normals; `flux_row`: mass flux (momentum, energy
     follow); `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`:
@@ -273,7 +272,7 @@ def make_flux(
     def fill_flux(Z, n, parameters):
         """Fluxes of mass, momentum and energy per time, from `fill_upwind`."""
         for k in range(1, n + 1):
-            # the upwind side of the contact, with the energy of a torn cell
+            # the upwind side of the contact, with the energy of a failed cell
             rho = Z[scratch.RHO_SIDE + k]
             p = Z[scratch.P_SIDE + k]
             e = energy_part(rho, p, parameters)
@@ -300,8 +299,8 @@ def make_flux(
                 wave,
                 (
                     Z[face_row + k],
-                    Z[face_row + SCRATCH_SPAN + k],
-                    Z[face_row + 2 * SCRATCH_SPAN + k],
+                    Z[face_row + scratch.TO_AREA_Y + k],
+                    Z[face_row + scratch.TO_SWEEP + k],
                 ),
             )
             if withholds:
@@ -309,9 +308,9 @@ def make_flux(
             # kept for the update
             mass, momentum_x, momentum_y, energy, pressure = flux
             Z[flux_row + k] = mass
-            Z[flux_row + SCRATCH_SPAN + k] = momentum_x
-            Z[flux_row + 2 * SCRATCH_SPAN + k] = momentum_y
-            Z[flux_row + 3 * SCRATCH_SPAN + k] = energy
+            Z[flux_row + scratch.TO_MOMENTUM_X + k] = momentum_x
+            Z[flux_row + scratch.TO_MOMENTUM_Y + k] = momentum_y
+            Z[flux_row + scratch.TO_ENERGY + k] = energy
             if pressure_row:
                 Z[pressure_row + k] = pressure
 
@@ -319,13 +318,20 @@ def make_flux(
 
 
 def make_hll_flux(
-    energy_part, faces, marks, flux_row, pressure_row, opens_voids, find_leaving_part=None, force=0
+    energy_part,
+    faces,
+    marks,
+    flux_row,
+    pressure_row,
+    opens_voids,
+    find_leaving_part=None,
+    stress_row=0,
 ):
-    """Phase that replaces HLLC fluxes by HLL ones at the faces of cells whose switch is on.
+    """Make the kernel that replaces HLLC fluxes by HLL ones at faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
-    of the faces; `marks`: the HLL switch of the cells on the left and their energies where they are
-    torn; `force`: as in `make_upwind`.
+    of the faces; `marks`: the HLL switch of the cells on the left and their energies where they
+    have failed; `stress_row`: as in `make_upwind`.
     """
 
     left_row, right_row, face_row = faces
@@ -338,31 +344,31 @@ def make_hll_flux(
         start = (first - 1) // scratch.VECTOR_LANES * scratch.VECTOR_LANES
         Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
         for k in range(1, scratch.count_padded(last - start - 1) + 1):
-            # states on both sides of the face, with the energy of torn cells
+            # states on both sides of the face, with the energy of failed cells
             rho_l = Z[left_row + k]
-            p_l = Z[left_row + 3 * SCRATCH_SPAN + k]
+            p_l = Z[left_row + scratch.TO_P + k]
             rho_r = Z[right_row + k]
-            p_r = Z[right_row + 3 * SCRATCH_SPAN + k]
+            p_r = Z[right_row + scratch.TO_P + k]
             e_l = energy_part(rho_l, p_l, parameters)
             e_r = energy_part(rho_r, p_r, parameters)
             if opens_voids:
                 e_l = choose_own(e_l, Z[voided_row + k], Z[voided_row + k])
                 e_r = choose_own(e_r, Z[scratch.VOIDED_ENERGY + k], Z[scratch.VOIDED_ENERGY + k])
-            u_l, v_l = Z[left_row + SCRATCH_SPAN + k], Z[left_row + 2 * SCRATCH_SPAN + k]
-            u_r, v_r = Z[right_row + SCRATCH_SPAN + k], Z[right_row + 2 * SCRATCH_SPAN + k]
-            c2_l = Z[left_row + 4 * SCRATCH_SPAN + k]
-            c2_r = Z[right_row + 4 * SCRATCH_SPAN + k]
-            if force:
-                p_l = p_l - Z[force + k]
-                p_r = p_r - Z[force + 2 * SCRATCH_SPAN + k]
+            u_l, v_l = Z[left_row + scratch.TO_U + k], Z[left_row + scratch.TO_V + k]
+            u_r, v_r = Z[right_row + scratch.TO_U + k], Z[right_row + scratch.TO_V + k]
+            c2_l = Z[left_row + scratch.TO_C2 + k]
+            c2_r = Z[right_row + scratch.TO_C2 + k]
+            if stress_row:
+                p_l = p_l - Z[stress_row + k]
+                p_r = p_r - Z[stress_row + scratch.TO_NORMAL_RIGHT + k]
             # the HLL flux (theory F3.10)
             flux = riemann.compute_hll_flux(
                 (rho_l, u_l, v_l, p_l, e_l, c2_l),
                 (rho_r, u_r, v_r, p_r, e_r, c2_r),
                 (
                     Z[face_row + k],
-                    Z[face_row + SCRATCH_SPAN + k],
-                    Z[face_row + 2 * SCRATCH_SPAN + k],
+                    Z[face_row + scratch.TO_AREA_Y + k],
+                    Z[face_row + scratch.TO_SWEEP + k],
                 ),
             )
             if withholds:
@@ -376,13 +382,13 @@ def make_hll_flux(
             # it replaces the sharp one where either cell asks for it
             switch_on = Z[switch_row + k] + Z[scratch.HLL + k]
             sharp_mass = Z[flux_row + k]
-            sharp_x = Z[flux_row + SCRATCH_SPAN + k]
-            sharp_y = Z[flux_row + 2 * SCRATCH_SPAN + k]
-            sharp_energy = Z[flux_row + 3 * SCRATCH_SPAN + k]
+            sharp_x = Z[flux_row + scratch.TO_MOMENTUM_X + k]
+            sharp_y = Z[flux_row + scratch.TO_MOMENTUM_Y + k]
+            sharp_energy = Z[flux_row + scratch.TO_ENERGY + k]
             Z[flux_row + k] = mass if switch_on > 0.0 else sharp_mass
-            Z[flux_row + SCRATCH_SPAN + k] = momentum_x if switch_on > 0.0 else sharp_x
-            Z[flux_row + 2 * SCRATCH_SPAN + k] = momentum_y if switch_on > 0.0 else sharp_y
-            Z[flux_row + 3 * SCRATCH_SPAN + k] = energy if switch_on > 0.0 else sharp_energy
+            Z[flux_row + scratch.TO_MOMENTUM_X + k] = momentum_x if switch_on > 0.0 else sharp_x
+            Z[flux_row + scratch.TO_MOMENTUM_Y + k] = momentum_y if switch_on > 0.0 else sharp_y
+            Z[flux_row + scratch.TO_ENERGY + k] = energy if switch_on > 0.0 else sharp_energy
             if pressure_row:
                 sharp_pressure = Z[pressure_row + k]
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure
@@ -390,17 +396,17 @@ def make_hll_flux(
     return use_hll
 
 
-def make_shear_flux(faces, nodes, shears, force, flux, speed, geometry: Geometry):
-    """Phase that adds the shear stress on a row of faces to the fluxes through them.
+def make_shear_flux(faces, nodes, shears, stress_row, flux_row, speed_row, geometry: Geometry):
+    """Make the kernel that adds the shear stress on a row of faces to the fluxes through them.
 
     Scratch offsets: `faces`: the traced densities on both sides and the normals of the faces;
     `nodes`: of x of the nodes at a face's ends, as in `make_faces`; `shears`: of the shear moduli
-    on both sides; `force`: as in `make_upwind`; `flux`: of the mass flux, PUSH and HOOP being the
-    fifth and sixth row; `speed`: where the velocity of the contacts is kept (two rows).
+    on both sides; `stress_row`: as in `make_upwind`; `flux_row`: of the mass flux;
+    `speed_row`: where the velocity of the contacts is kept (two rows).
     """
-    left, right, face = faces
-    shear_l, shear_r = shears
-    node_a, node_b = nodes
+    left_row, right_row, face_row = faces
+    shear_row_l, shear_row_r = shears
+    node_row_a, node_row_b = nodes
     curved = geometry.curved
 
     @compiled_once(allocates=False)
@@ -408,34 +414,42 @@ def make_shear_flux(faces, nodes, shears, force, flux, speed, geometry: Geometry
         """Both sides of a face stick together (theory F20.6); where neither has a shear modulus
         there is no stress."""
         for k in range(1, n + 1):
-            area_x = Z[face + k]
-            area_y = Z[face + SCRATCH_SPAN + k]
+            area_x = Z[face_row + k]
+            area_y = Z[face_row + scratch.TO_AREA_Y + k]
             area = (area_x * area_x + area_y * area_y) ** 0.5
             inverse = 1.0 / area
             nx = area_x * inverse
             ny = area_y * inverse
-            speed_l = Z[left + 2 * SCRATCH_SPAN + k] * nx - Z[left + SCRATCH_SPAN + k] * ny
-            speed_r = Z[right + 2 * SCRATCH_SPAN + k] * nx - Z[right + SCRATCH_SPAN + k] * ny
+            speed_l = Z[left_row + scratch.TO_V + k] * nx - Z[left_row + scratch.TO_U + k] * ny
+            speed_r = Z[right_row + scratch.TO_V + k] * nx - Z[right_row + scratch.TO_U + k] * ny
             stress, speed_along = compute_shear_contact(
-                ((Z[left + k] * Z[shear_l + k]) ** 0.5, speed_l, Z[force + SCRATCH_SPAN + k]),
-                ((Z[right + k] * Z[shear_r + k]) ** 0.5, speed_r, Z[force + 3 * SCRATCH_SPAN + k]),
+                (
+                    (Z[left_row + k] * Z[shear_row_l + k]) ** 0.5,
+                    speed_l,
+                    Z[stress_row + scratch.TO_TANGENT_LEFT + k],
+                ),
+                (
+                    (Z[right_row + k] * Z[shear_row_r + k]) ** 0.5,
+                    speed_r,
+                    Z[stress_row + scratch.TO_TANGENT_RIGHT + k],
+                ),
             )
             # its force along the face, and what that does
-            Z[flux + SCRATCH_SPAN + k] += stress * area_y
-            Z[flux + 3 * SCRATCH_SPAN + k] -= stress * speed_along * area
+            Z[flux_row + scratch.TO_MOMENTUM_X + k] += stress * area_y
+            Z[flux_row + scratch.TO_ENERGY + k] -= stress * speed_along * area
             if curved:
                 plane_area_x = 0.5 * (
-                    (Z[node_b + SCRATCH_SPAN + k] - Z[node_a + SCRATCH_SPAN + k])
-                    + (Z[node_b + 3 * SCRATCH_SPAN + k] - Z[node_a + 3 * SCRATCH_SPAN + k])
+                    (Z[node_row_b + scratch.TO_Y + k] - Z[node_row_a + scratch.TO_Y + k])
+                    + (Z[node_row_b + scratch.TO_Y_NEW + k] - Z[node_row_a + scratch.TO_Y_NEW + k])
                 )
-                Z[flux + 4 * SCRATCH_SPAN + k] -= stress * plane_area_x
-                Z[flux + 5 * SCRATCH_SPAN + k] -= stress * area_x
+                Z[flux_row + scratch.TO_PUSH + k] -= stress * plane_area_x
+                Z[flux_row + scratch.TO_HOOP + k] -= stress * area_x
             else:
-                Z[flux + 2 * SCRATCH_SPAN + k] -= stress * area_x
+                Z[flux_row + scratch.TO_MOMENTUM_Y + k] -= stress * area_x
             # velocity of the contact: across the face as fast as the contact in HLLC
             speed_across = Z[scratch.PUSH + k] / Z[scratch.DRAG + k]
-            speed_across = (speed_across + Z[face + 2 * SCRATCH_SPAN + k]) * inverse
-            Z[speed + k] = speed_across * nx - speed_along * ny
-            Z[speed + SCRATCH_SPAN + k] = speed_across * ny + speed_along * nx
+            speed_across = (speed_across + Z[face_row + scratch.TO_SWEEP + k]) * inverse
+            Z[speed_row + k] = speed_across * nx - speed_along * ny
+            Z[speed_row + scratch.TO_Y + k] = speed_across * ny + speed_along * nx
 
     return add_shear_flux

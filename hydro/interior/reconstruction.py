@@ -72,9 +72,10 @@ def fill_length_j(Z, n):
 
 
 def make_geometry(compute_volume):
-    """Phase that fills line vectors and volumes of a row's cells; compute_volume: of a `Geometry`.
+    """Make the kernel that fills line vectors and volumes of a row's cells.
 
-    Only where lines lean (`hydro.interior.axisymmetric`): else the slopes' loop finds all of it.
+    compute_volume: of a `Geometry`.  Only where lines lean (`hydro.interior.axisymmetric`): else
+    the loop of the slopes finds all of it.
     """
 
     @compiled_once(allocates=False)
@@ -92,7 +93,7 @@ def make_geometry(compute_volume):
 
 
 def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
-    """Phase that fills c², the energy and the HLL switch of the row's cells.
+    """Make the kernel that fills c², the energy and the HLL switch of the row's cells.
 
     `least_jump`: of HLL_JUMP_THRESHOLDS in `hydro.formulas.riemann`; `opens_voids`: of the equation
     of state.
@@ -127,8 +128,8 @@ def make_switch(sound_speed_squared_part, energy_part, least_jump, opens_voids):
     return fill_switch
 
 
-class RowPhases(NamedTuple):
-    """Phases over the rows of a scratch."""
+class RowKernels(NamedTuple):
+    """Row kernels that reconstruct the cells of a row of a scratch."""
 
     measure_after: object
     next_row: object
@@ -137,10 +138,10 @@ class RowPhases(NamedTuple):
 
 
 @functools.cache
-def make_row_phases(
+def make_row_kernels(
     eos_class, limiter: str, geometry: Geometry, flux: str, is_solid: bool = False
-) -> RowPhases:
-    """Phases of an equation of state, a limiter, a geometry and a flux; is_solid: with stress.
+) -> RowKernels:
+    """Row kernels of an equation of state, a limiter, a geometry and a flux; is_solid: with stress.
 
     A solid has elastic waves that run ahead of plastic ones, as in a material with kinks.
     """
@@ -190,6 +191,6 @@ def make_row_phases(
             fill_smooth(Z, n)
         fill_gradients(Z, scratch.count_whole(m), half_dt, parameters)
 
-    return RowPhases(
+    return RowKernels(
         measure_after, next_row, reconstruct, make_extrapolation(limit, geometry, sound)
     )

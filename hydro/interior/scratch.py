@@ -10,11 +10,11 @@ so entries beyond a row's last neighbour are written but never used.  A loop tha
 1 or k + 1 of a row and writes one of the next two rows is not vectorised (its loads might wait for
 its stores), so results are placed before what is read.
 
-The phases of a step are loops over the entries 1..n of rows of the flat scratch `Z`: the m cells of
-a chunk in whole vectors, plus the next neighbour only if its result is read.  The input of a phase
+A row kernel is a loop over the entries 1..n of rows of the flat scratch `Z`: the m cells of a
+chunk in whole vectors, plus the next neighbour only if its result is read.  The input of a kernel
 must already be in the scratch, and only `copy_*` access other arrays; a loop with a long chain of
 dependent operations stalls, two loops over its halves do not.  Rows are copied by `memcpy`, in a
-third of the time of a loop that first checks for overlap, and rows that the next phases copy are
+third of the time of a loop that first checks for overlap, and rows that the next kernels copy are
 prefetched into the second-level cache: a block's arrays are larger than the caches, and a chunk of
 a row is too short for the hardware prefetcher (at 400² cells the flow spent a fifth of its time
 waiting for memory).  Note: numba has no such hint, so it is an LLVM intrinsic, bound to a plain
@@ -101,16 +101,30 @@ SUM_VOIDED, SUM_EMPTIED = _rows(2)
 SHEAR, SHEAR_BEFORE, SHEAR_WAVE, SHEAR_WAVE_BEFORE = _rows(4)
 STRESS_X, STRESS_Y, STRESS_SPREAD, STRESS_HOOP = _rows(4)
 # s_nn and s_nt on the faces towards -i and -j, traced from the cells before, then from those after
-STRESS_I = next(_next)
-_rows(3)
-STRESS_J = next(_next)
-_rows(3)
+STRESS_I, *_ = _rows(4)
+STRESS_J, *_ = _rows(4)
 # part of the pressure that is the stress on the upwind side's face; velocity of faces' contacts
 STRESS_SIDE = next(_next)
 SPEED_I_X, SPEED_I_Y = _rows(2)
 SPEED_J_X, SPEED_J_Y = _rows(2)
 
 SIZE = next(_next) + 1
+
+# in a row of faces along j entry k is the low face of cell k; the cell below it is one entry before
+CELL_BELOW = -1
+
+# From the first row of something to its others.  Of a traced state, which begins with rho:
+TO_U, TO_V, TO_P, TO_C2 = (SCRATCH_SPAN * row for row in range(1, 5))
+# of faces, which begin with the normal's x; TO_MIDDLE: their midpoints
+TO_AREA_Y, TO_SWEEP, TO_MIDDLE_X, TO_MIDDLE_Y = (SCRATCH_SPAN * row for row in range(1, 5))
+# of fluxes, which begin with mass
+TO_MOMENTUM_X, TO_MOMENTUM_Y, TO_ENERGY, TO_PUSH, TO_HOOP = (
+    SCRATCH_SPAN * row for row in range(1, 6)
+)
+# of old and new nodes, which begin with the old x
+TO_Y, TO_X_NEW, TO_Y_NEW = (SCRATCH_SPAN * row for row in range(1, 4))
+# of stresses on faces, which begin with s_nn on the left
+TO_TANGENT_LEFT, TO_NORMAL_RIGHT, TO_TANGENT_RIGHT = (SCRATCH_SPAN * row for row in range(1, 4))
 
 # rows that hold a vector: offsets of x and y
 LOW = (X_LOW, Y_LOW)

@@ -67,10 +67,10 @@ def make_difference_weights(geometry):
 
 
 def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
-    """Phase that fills the gradients of a row's cells and predicts: a `Geometry` and a limiter.
+    """Make the kernel that fills the gradients of a row's cells and their states at mid-time.
 
     Plane: what the cells are on the old grid, c², the energy and the HLL switch come from the same
-    loop (switch: the formulas of `hydro.interior.reconstruction.make_switch`); curved: from phases
+    loop (switch: the formulas of `hydro.interior.reconstruction.make_switch`); curved: from kernels
     before.
 
     With `relaxed`, where the flow turns and neither compresses nor jumps, the velocity's slopes
@@ -243,7 +243,7 @@ def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
 
 
 def make_extrapolation(limit, geometry, sound_speed_squared_part):
-    """Phase that takes the states of a side's cells to its faces."""
+    """Make the kernel that takes the states of a side's cells to its faces."""
     compute_difference_weights = make_difference_weights(geometry)
 
     @compiled_once(allocates=False)

@@ -30,7 +30,7 @@ def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
 
 
 def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
-    """Phase that updates rows, of an equation of state class and a `Geometry`.
+    """Make the kernel that updates rows, of an equation of state class and a `Geometry`.
 
     `finishes`: it turns the waiting conserved quantities of the row before into its new state;
     `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.

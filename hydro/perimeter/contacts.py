@@ -70,7 +70,9 @@ from shockgrid.hydro.rim import (
 from shockgrid.hydro.rows import FLUX_ROWS
 from shockgrid.regrid.jit import compiled_once, kernel
 
-AT_CELLS, AT_TRACES, AT_FLUX = range(3)  # phases of a step in which contacts are solved
+# stages of a step at which contacts are solved: from the cells, from their traces on the old grid,
+# from the traces on the moved faces, with the fluxes
+AT_CELLS, AT_TRACES, AT_FLUX = range(3)
 WALL, PISTON, AXIS = range(3)  # kinds of wall
 MOST_WIDENING = 1.5  # of a ghost's velocity over the cell's, outwards, in sound speeds
 
@@ -304,41 +306,41 @@ def flow_along(rim, speeds, first):
 
 
 @kernel
-def solve_link(rim, other_rim, pairs, wave_law, other_wave_law, layer, phase, curved):
-    """Contact states of a link's faces, into both rims, in a phase of the step.
+def solve_link(rim, other_rim, pairs, wave_law, other_wave_law, layer, stage, curved):
+    """Contact states of a link's faces, into both rims, in a stage of the step.
 
     AT_CELLS: from the cells' states at the faces, with the ghosts that stand for them; AT_TRACES:
     from the traces; AT_FLUX: the same, with the fluxes through both sides' faces, and what flows
     along a line with a thickness: layer = (speeds, backwards, closed) of `add_layer_flux`.
     """
     first, other_first, step, count = pairs
-    state_row = RHO_FACE if phase == AT_CELLS else RHO_TRACE
+    state_row = RHO_FACE if stage == AT_CELLS else RHO_TRACE
     for pair in range(count):
         k = first + pair
         m = other_first + step * pair
         solve_contact(rim, k, other_rim, m, state_row, wave_law, other_wave_law)
-        if phase == AT_CELLS:
+        if stage == AT_CELLS:
             fill_ghost_from_face(rim, k)
             fill_ghost_from_face(other_rim, m)
-        elif phase == AT_FLUX:
+        elif stage == AT_FLUX:
             fill_impermeable_flux(rim, k, curved)
             fill_impermeable_flux(other_rim, m, curved)
     speeds, backwards, closed = layer
-    if phase == AT_FLUX and speeds.shape[1] > 0:
+    if stage == AT_FLUX and speeds.shape[1] > 0:
         add_layer_flux(rim, speeds, False, closed, first)
         other_first = other_first if step > 0 else other_first - count + 1
         add_layer_flux(other_rim, speeds, backwards, closed, other_first)
 
 
 @kernel(allocates=False)
-def pass_seam(rim, other_rim, pairs, phase, curved):
+def pass_seam(rim, other_rim, pairs, stage, curved):
     """AT_CELLS: the cells on either side of a seam are the other's ghosts; AT_FLUX: the flux
     through the common faces, what one loses the other gets."""
     first, other_first, step, count = pairs
     for pair in range(count):
         k = first + pair
         m = other_first + step * pair
-        if phase == AT_CELLS:
+        if stage == AT_CELLS:
             for q in range(P + 1):
                 rim[RHO_GHOST + q, k] = other_rim[q, m]
                 other_rim[RHO_GHOST + q, m] = rim[q, k]
@@ -367,15 +369,15 @@ def fill_ghosts_from_faces(rim, spans):
 
 
 @kernel(allocates=False)
-def fill_free_surface(rim, spans, wave_law, pressure, phase, curved):
-    """Contact states of a surface under a given pressure; the phases are those of `solve_link`, but
+def fill_free_surface(rim, spans, wave_law, pressure, stage, curved):
+    """Contact states of a surface under a given pressure; the stages are those of `solve_link`, but
     AT_FLUX solves nothing."""
-    state_row = RHO_FACE if phase == AT_CELLS else RHO_TRACE
+    state_row = RHO_FACE if stage == AT_CELLS else RHO_TRACE
     for number in range(spans.shape[0]):
         for k in range(spans[number, 0], spans[number, 1]):
             p_inside = pressure + (rim[VOID_P, k] + rim[JUMP, k])
             rim[P_STAR, k] = p_inside
-            if phase == AT_FLUX:
+            if stage == AT_FLUX:
                 fill_impermeable_flux(rim, k, curved)
                 continue
             nx, ny = find_normal(rim, k)
@@ -393,7 +395,7 @@ def fill_free_surface(rim, spans, wave_law, pressure, phase, curved):
             rim[U_STAR, k] = u + (w_star - w) * nx
             rim[V_STAR, k] = v + (w_star - w) * ny
             rim[SLIP, k] = 0.0
-            if phase == AT_CELLS:
+            if stage == AT_CELLS:
                 fill_ghost_from_face(rim, k)
 
 

@@ -63,7 +63,7 @@ def measure_volume(nodes, i, j, compute_volume):
 
 
 def make_fill_faces(geometry: Geometry):
-    """Phase that fills the faces of a rim; `Geometry.face`."""
+    """Make the kernel that fills the faces of a rim; `Geometry.face`."""
     compute_face = geometry.face
     curved = geometry.curved
 

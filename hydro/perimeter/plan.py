@@ -24,8 +24,8 @@ class PerimeterPlan:
     def __init__(self, segments: Sequence[Any], faces: int = 0):
         self.segments = list(segments)
         self.ghosts, self.speeds, self.fluxes = (
-            [segment for segment in segments if segment.has(phase)]
-            for phase in ("fill_ghosts", "fill_speeds", "fill_flux")
+            [segment for segment in segments if segment.overrides(method)]
+            for method in ("fill_ghosts", "fill_speeds", "fill_flux")
         )
         walls = [s for s in segments if s.wall is not None]
         self.walls = _collect([(s.first, s.last, s.wall) for s in walls], 3)

@@ -1,6 +1,6 @@
 """The cells along a block's sides: gathered, reconstructed, traced to its faces.
 
-A side is a strip of three rows of cells.  It goes through the phases of the block's inside
+A side is a strip of three rows of cells.  It goes through the kernels of the block's inside
 (`hydro.interior`) in the same scratch, turned so that its rows run inwards: what a face on a side
 has is bitwise what it would have inside a block.  Nothing here knows what lies beyond.
 Note: a strip along i_max or j_min runs against its side's numbering (a grid that is turned
@@ -23,7 +23,7 @@ from shockgrid.hydro.formulas.reconstruction import (
 )
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
 from shockgrid.hydro.interior import scratch
-from shockgrid.hydro.interior.reconstruction import make_row_phases
+from shockgrid.hydro.interior.reconstruction import make_row_kernels
 from shockgrid.hydro.interior.scratch import SCRATCH_SPAN
 from shockgrid.hydro.interior.slopes import fill_steps
 from shockgrid.hydro.interior.solid import SolidArrays
@@ -202,7 +202,7 @@ def make_side_kernels(
     opens_voids = eos_class.opens_voids
     curved = geometry.curved
     low_mach = limiter in LOW_MACH
-    rows = make_row_phases(eos_class, limiter, geometry, flux, is_solid)
+    rows = make_row_kernels(eos_class, limiter, geometry, flux, is_solid)
     measure_after = rows.measure_after
     next_row = rows.next_row
     reconstruct = rows.reconstruct

@@ -160,8 +160,7 @@ def take_over(old: Simulation, new: Simulation) -> list[RemappedBlock]:
     # rates and totals of the new cells
     for block in new.blocks:
         block.copy_start()
-        phases.update(block, 0.0)  # rates and totals of this state
-        block.rates[...] = block.rates_new
+        phases.measure_rates(block)
     new.clock.retry_dt = np.inf  # it was for the old cells
     new.clock.rate = new.small_cells.find_first_rate(old.t)
     return report

@@ -324,13 +324,13 @@ class SlidingContact:
         )
         self.follower.scatter_excess("excess_volume_new", self.excess_volume_new)
 
-    def solve(self, phase: int, dt: float) -> None:
+    def solve(self, stage: int, dt: float) -> None:
         """Contact states of both sides from the cells, extrapolated to their faces, or from the
         traces; or fluxes from the traces."""
-        if phase == AT_FLUX:
+        if stage == AT_FLUX:
             self.fill_fluxes(dt)
         else:
-            self._solve_pieces(AT_FACE if phase == AT_CELLS else TRACE, *self.lines)
+            self._solve_pieces(AT_FACE if stage == AT_CELLS else TRACE, *self.lines)
             self._fill_surfaces()
 
     def _fill_surfaces(self) -> None:

@@ -23,7 +23,7 @@ Hessian on coarse nodes and the sweeps know none of the formulas: they call thos
                   `take_corner_numbers` if it has numbers of its own
     of a cell     `cell_value`, `cell_slope`, `cell_stiffness`, `cell_blocks`; `CellNumbers` and
                   `take_cell_numbers`; `has_cell_terms`, `is_active`, `measure_activity` say where
-                  it acts
+                  it acts, `without_cell_terms` leaves it out
     of a line     `weigh_edge` (weight and length of an edge); a force along lines that is not
                   linear in the edges also `assembly.fill_line_edges` and `fill_near_blocks`,
                   `residual_estimate.add_row`, `untangle.add_line_energy` and
@@ -333,6 +333,11 @@ def find_mid_lines(low, up, near, far):
 def has_cell_terms(inputs):
     """Whether any term of cells has a weight in this block; `inputs` are `BarrierInputs`."""
     return inputs.cost_weight > 0.0
+
+
+def without_cell_terms(inputs):
+    """`inputs`, which are `BarrierInputs`, of a functional that has no terms of cells."""
+    return inputs._replace(cost_weight=0.0)
 
 
 @inlined

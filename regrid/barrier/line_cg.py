@@ -241,17 +241,17 @@ def make_solver(parallel, multiply, advance):
     """
 
     @kernel(parallel=parallel)
-    def solve(columns, H, vectors, directions, totals, limits, scratch):
+    def solve(columns, H, vectors, directions, totals, criterion, scratch):
         """Solve `H x = r0` from the x whose residual is `r`.
 
         `columns` (chunks + 1) are the first node columns of the chunks, `vectors` x, r, z,
-        `directions` work arrays for p, the previous one and Hp.  `limits`: it stops when the
+        `directions` work arrays for p, the previous one and Hp.  `criterion`: it stops when the
         squared residual, in the norm of the preconditioner, is below tolerance² of its first value
         or below floor, or after the given number of iterations.  Returns their number, the first
         and the last squared residual, and whether the matrix was positive in all directions.
         """
         p, p_old, product = directions
-        tolerance, floor, most_iterations = limits
+        tolerance, floor, most_iterations = criterion
         chunks = columns.shape[0] - 1
         begin = columns[0]
         end = columns[chunks]

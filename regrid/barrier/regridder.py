@@ -59,7 +59,7 @@ class _NoGrid(Exception):
 
     def turn_back(self, orientation: Orientation) -> tuple[np.ndarray, bool, bool]:
         """The same of the block as it was before it was turned."""
-        turn = orientation.turn.exchange() if self.transposed else orientation.turn
+        turn = orientation.turn.transpose() if self.transposed else orientation.turn
         trial = turn.apply(self.trial)
         return (trial[::-1] if turn.mirrors else trial), self.transposed, self.too_sharp
 

@@ -167,7 +167,7 @@ def is_too_small(trial, old, least_ratio, i, j, corner):
 
 
 @inlined
-def mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows):
+def mark_failing_corners(trial, old, least_ratio, round_number, failed_in, marked_rows):
     """Mark the nodes of every corner triangle that fails in a round; True if there is any.
 
     `failed_in` (ni+1, nj+1) is the last round, from 1, in which a node was marked, `marked_rows`
@@ -177,14 +177,14 @@ def mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows)
     ni, nj = trial.shape[1] - 1, trial.shape[2] - 1
     failed = False
     for i in range(ni):
-        if round > 0 and marked_rows[i] < round and marked_rows[i + 1] < round:
+        if round_number > 0 and marked_rows[i] < round_number and marked_rows[i + 1] < round_number:
             continue
         for j in range(nj):
             touched_in = max(
                 max(failed_in[i, j], failed_in[i, j + 1]),
                 max(failed_in[i + 1, j], failed_in[i + 1, j + 1]),
             )
-            if touched_in < round:
+            if touched_in < round_number:
                 continue
             for corner in range(4):
                 p, q, next_p, next_q = find_triangle(i, j, corner)
@@ -192,12 +192,12 @@ def mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows)
                     continue
                 if is_too_small(trial, old, least_ratio, i, j, corner):
                     failed = True
-                    mark = round + 1.0
+                    mark = round_number + 1.0
                     failed_in[p, q] = mark
                     failed_in[next_p, q] = mark
                     failed_in[p, next_q] = mark
-                    marked_rows[i] = round + 1
-                    marked_rows[i + 1] = round + 1
+                    marked_rows[i] = round_number + 1
+                    marked_rows[i + 1] = round_number + 1
     return failed
 
 
@@ -218,15 +218,15 @@ def shorten_steps(base, trial, old, least_ratio, tau):
     change = trial - base
     smallest = 0.5**MOST_NODE_HALVINGS
     marked_rows = np.zeros(ni + 1, dtype=np.int64)
-    for round in range(100 * MOST_NODE_HALVINGS):
-        if not mark_failing_corners(trial, old, least_ratio, round, failed_in, marked_rows):
-            return round
+    for round_number in range(100 * MOST_NODE_HALVINGS):
+        if not mark_failing_corners(trial, old, least_ratio, round_number, failed_in, marked_rows):
+            return round_number
         # halve the steps of the marked inner nodes
         for i in range(1, ni):
-            if marked_rows[i] <= round:
+            if marked_rows[i] <= round_number:
                 continue
             for j in range(1, nj):
-                if failed_in[i, j] > round:
+                if failed_in[i, j] > round_number:
                     halved = 0.5 * fraction[i, j] if fraction[i, j] > smallest else 0.0
                     fraction[i, j] = halved
                     for k in range(2):

@@ -87,8 +87,8 @@ def choose_orientation(
     if transposed:
         exchanged = [grid[::-1].transpose(0, 2, 1) for grid in (previous, boundary)]
         orientation = choose_orientation(*exchanged, [values.T for values in cell_values])
-        symmetries = tuple(turn.exchange() for turn in orientation.symmetries)
-        return Orientation(orientation.turn.exchange(), orientation.negated, symmetries)
+        symmetries = tuple(turn.transpose() for turn in orientation.symmetries)
+        return Orientation(orientation.turn.transpose(), orientation.negated, symmetries)
     wanted = previous.copy()
     copy_sides(boundary, wanted)
     # the turn that the rule of lengths prefers

@@ -43,6 +43,7 @@ from shockgrid.regrid.barrier.functional import (
     take_cell_numbers,
     take_corner_numbers,
     take_corner_weight,
+    without_cell_terms,
 )
 from shockgrid.regrid.barrier.side_inputs import GROWTH, LENGTH, LENGTH_CHANGE, STEP_CHANGE
 from shockgrid.regrid.barrier.step_control import CHUNK_SPAN, NO_LIMIT
@@ -179,8 +180,8 @@ def fill_energy(nodes, inputs, spread, barrier, first, last, Z):
             add_cell_values(nodes, i, inputs, first, cells, Z)
 
 
-class SolveLimits(NamedTuple):
-    """When the linear solve of a step ends: at a part of its first residual, or its iterations."""
+class StoppingCriterion(NamedTuple):
+    """When the linear solve of a step ends: its residual over the first, and most iterations."""
 
     tolerance: float
     iterations: int
@@ -197,15 +198,15 @@ class Step(NamedTuple):
 def untangle(work, nodes, tuning: Tuning = DEFAULT) -> bool:
     """Unfold `nodes`, an array of the workspace, in place; True when all corners are positive."""
     inputs = work.inputs
-    limits = SolveLimits(tuning.untangle_tolerance, UNTANGLING_ITERATIONS)
+    criterion = StoppingCriterion(tuning.untangle_tolerance, UNTANGLING_ITERATIONS)
     work.inputs = inputs._replace(epsilon=tuning.untangle_barrier * inputs.epsilon)
-    last_spread = _lower_spread(work, nodes, 1, LEAST_SPREAD, tuning.untangle_steps, limits)
+    last_spread = _lower_spread(work, nodes, 1, LEAST_SPREAD, tuning.untangle_steps, criterion)
     # more steps open what is sharp; none may halve the least scaled area
     if last_spread is not None:
         for factor in tuning.last_spreads:
             spread = factor * work.area_target
             energy, least_area = work.compute_energy(nodes, spread)
-            _step(work, nodes, spread, energy, limits, 0.5 * least_area)
+            _step(work, nodes, spread, energy, criterion, 0.5 * least_area)
     work.inputs = inputs
     return last_spread is not None
 
@@ -236,15 +237,15 @@ def unfold(work, nodes, tuning: Tuning, unfolding: Unfolding) -> bool:
     graded = unfolding in (Unfolding.GRADED, Unfolding.GRADED_SPREAD)
     work.inputs = make_graded_inputs(work) if graded else make_even_inputs(work)
     work.area_target = 1.0
-    limits = SolveLimits(tuning.exact_tolerance, FREE_ITERATIONS)
+    criterion = StoppingCriterion(tuning.exact_tolerance, FREE_ITERATIONS)
     # a nearly harmonic map at first
     if unfolding in (Unfolding.GRADED_SPREAD, Unfolding.EVEN_SPREAD):
         spread = WIDE_SPREAD_FACTOR * max(1.0, -work.compute_least_area(nodes))
         energy = work.compute_energy(nodes, spread)[0]
         for _ in range(ROUND_STEPS):
-            energy = _step(work, nodes, spread, energy, limits).energy
+            energy = _step(work, nodes, spread, energy, criterion).energy
     last_spread = _lower_spread(
-        work, nodes, ROUND_STEPS, LEAST_FREE_SPREAD, tuning.free_steps, limits
+        work, nodes, ROUND_STEPS, LEAST_FREE_SPREAD, tuning.free_steps, criterion
     )
     work.inputs = inputs
     work.area_target = area_target
@@ -265,9 +266,9 @@ def make_even_inputs(work):
     for table, length in zip(along, mean_edges, strict=True):
         table[LENGTH] = scale * length
         table[[LENGTH_CHANGE, STEP_CHANGE]] = 0.0
-    return work.inputs._replace(
+    return without_cell_terms(work.inputs)._replace(
         along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, keeps_spacing=False,
-        area_target=1.0, epsilon=1.0, area_weight=1.0, cost_weight=0.0,
+        area_target=1.0, epsilon=1.0, area_weight=1.0,
     )  # fmt: skip
 
 
@@ -278,14 +279,19 @@ def make_graded_inputs(work):
     for table in along:
         table[[LENGTH, LENGTH_CHANGE]] *= scale
         table[GROWTH] = 1.0
-    return work.inputs._replace(
+    return without_cell_terms(work.inputs)._replace(
         along_i=along[0], along_j=along[1], ki=0.0, kj=0.0, curved=False, departs=False,
-        area_target=1.0, epsilon=1.0, area_weight=1.0, cost_weight=0.0,
+        area_target=1.0, epsilon=1.0, area_weight=1.0,
     )  # fmt: skip
 
 
 def _lower_spread(
-    work, nodes, round_steps: int, least_spread: float, most_steps: int, limits: SolveLimits
+    work,
+    nodes,
+    round_steps: int,
+    least_spread: float,
+    most_steps: int,
+    criterion: StoppingCriterion,
 ) -> float | None:
     """Steps at falling e until `nodes` has no fold: the last e, or None where one stays."""
     least_area = work.compute_least_area(nodes)
@@ -301,7 +307,7 @@ def _lower_spread(
             if steps == most_steps:
                 return None
             energy_before = energy
-            fraction, energy, least_area = _step(work, nodes, spread, energy_before, limits)
+            fraction, energy, least_area = _step(work, nodes, spread, energy_before, criterion)
             steps += 1
             settled = energy > (1.0 - ROUND_GAIN) * energy_before
             if least_area > 0.0 or fraction == 0.0 or settled:
@@ -325,14 +331,19 @@ def _choose_next_spread(spread: float, least_area: float, gain: float) -> float:
 
 
 def _step(
-    work, nodes, spread: float, energy_before: float, limits: SolveLimits, floor: float = -np.inf
+    work,
+    nodes,
+    spread: float,
+    energy_before: float,
+    criterion: StoppingCriterion,
+    floor: float = -np.inf,
 ) -> Step:
     """One Newton step on the smoothed functional, halved until its energy falls.
 
     The least scaled corner area after it must not be below `floor`.
     """
     work.assemble_smoothed(nodes, spread)
-    work.solve(tolerance=limits.tolerance, floor=0.0, most=limits.iterations)
+    work.solve(tolerance=criterion.tolerance, floor=0.0, most=criterion.iterations)
     fraction = 1.0
     trial = work.trial
     for _ in range(MOST_STEP_HALVINGS_AT_SPREAD):

@@ -115,7 +115,7 @@ CELL_BELOW = -1
 
 # From the first row of something to its others.  Of a traced state, which begins with rho:
 TO_U, TO_V, TO_P, TO_C2 = (SCRATCH_SPAN * row for row in range(1, 5))
-# of faces, which begin with the normal's x; TO_MIDDLE: their midpoints
+# of faces, which begin with the normal's x; the middle is that of their ends
 TO_AREA_Y, TO_SWEEP, TO_MIDDLE_X, TO_MIDDLE_Y = (SCRATCH_SPAN * row for row in range(1, 5))
 # of fluxes, which begin with mass
 TO_MOMENTUM_X, TO_MOMENTUM_Y, TO_ENERGY, TO_PUSH, TO_HOOP = (

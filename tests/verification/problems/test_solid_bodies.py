@@ -3,8 +3,18 @@
 import numpy as np
 import pytest
 
+from builders import march as march_steps
 from builders import march_measured
+from shockgrid.hydro.block import Block
+from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.materials import find_material
+from shockgrid.hydro.links import join
+from shockgrid.hydro.simulation import Simulation
+from shockgrid.hydro.strength.laws import Perfect
 from shockgrid.hydro.strength.spall import CochranBanner, ConstantSpall
+from shockgrid.problems.initial_states import make_plane_grid
+from shockgrid.problems.references.elastic_waves import compute_wave_speeds
+from shockgrid.problems.solids import idealise
 from shockgrid.regrid.errors import BadInput
 from shockgrid.runs.deck.reading import read_deck
 
@@ -148,7 +158,12 @@ def test_strength_that_cannot_be_is_said_in_one_sentence(deck, settings, words):
 
 @pytest.mark.parametrize(
     "materials, speed",
-    [(("Al2024", "Cu"), 500.0), (("Cu", "Al2024"), 800.0), (("Al6061", "SS304"), 1000.0)],
+    [
+        (("Al2024", "Cu"), 500.0),
+        (("Cu", "Al2024"), 800.0),
+        (("Al6061", "SS304"), 1000.0),
+        (("Al6061", "Cu"), 10.0),  # elastic
+    ],
 )
 def test_an_impact_of_two_solids_has_the_exact_stress(materials, speed):
     law = "{ law = 'perfect', shear_modulus = 30e9, yield_strength = 0.25e9 }"
@@ -159,6 +174,70 @@ def test_an_impact_of_two_solids_has_the_exact_stress(materials, speed):
     problem, history, _ = march("flyer-target", *settings)
     rows = {row.name: row for row in problem.report_on(history).rows}
     assert rows["pressure"].find_error() < 1e-3
+
+
+def test_an_elastic_wave_reverberates_in_a_layer_of_another_material():
+    law = "{ law = 'perfect', shear_modulus = 30e9, yield_strength = 1e10 }"
+    layers = (("Cu", 4e-3, 120), ("Al2024", 1e-3, 60), ("Cu", 4e-3, 120))
+    plates = ", ".join(
+        f"{{ material = '{name}', thickness = {size}, cells = {cells} }}"
+        for name, size, cells in layers
+    )
+    settings = f"plates=[{plates}]", "speed=1.0", f"strength={law}", "run.t_end=1e-6", "bond=1e10"
+    problem, history, _ = march("flyer-target", *settings)
+    solids = [
+        idealise(material, laws.strength)
+        for material, laws in zip(problem.materials, problem.laws.values(), strict=True)
+    ]
+    speeds = [
+        float(compute_wave_speeds(one.eos, one.rho0, 0.0, one.shear_modulus)[0]) for one in solids
+    ]
+    impedance = [one.rho0 * speed for one, speed in zip(solids, speeds, strict=True)]
+    reflected = (impedance[0] - impedance[1]) / (impedance[0] + impedance[1])
+    transit = 1e-3 / speeds[1]
+    for arrivals in (1, 2, 3):
+        # each time that the wave is at the window's face, less is missing of half the speed
+        exact = 0.5 * (1.0 - reflected ** (2 * arrivals))
+        inside = np.abs(history["t"] - 2 * arrivals * transit) < 0.4 * transit
+        found = np.median(history["window_speed"][inside])
+        assert found == pytest.approx(exact, rel=1e-3), arrivals
+
+
+@pytest.mark.parametrize("swing", [0.0, 0.02])  # the grid stands, or moves through the solid
+def test_simple_shear_turns_the_stress_as_its_law_says(swing):
+    # Jaumann's rate: s_xy = G sin(gamma), s_xx = -s_yy = G (1 - cos(gamma))
+    shear_modulus = 1e6  # so soft that its energy leaves the pressure alone
+    height = 1e-3
+    speed = 300.0
+    nodes = make_plane_grid(np.linspace(0.0, height, 9), np.linspace(0.0, height, 9))
+
+    def move(name, t):
+        x, y = nodes
+        wave = np.sin(2.0 * np.pi * x / height) * np.sin(np.pi * y / height)
+        wave[-1] = wave[0]
+        return nodes + np.array([swing * height * wave * np.sin(1e6 * t), 0.0 * wave])
+
+    slab = Block(
+        "slab",
+        find_material("Al2024").eos,
+        nodes,
+        2785.0,
+        lambda x, y: speed * y / height,
+        0.0,
+        0.0,
+        strength=Perfect(shear_modulus, 1e12),
+    )
+    put(slab, "j_min", "wall", clamped=True)
+    put(slab, "j_max", "piston", velocity=(speed, 0.0), clamped=True)
+    links = [join("periodic", (slab, "i_min"), (slab, "i_max"))]
+    end = 1.5 * height / speed
+    flow = Simulation([slab], links, t_end=end, mesh=move)
+    march_steps(flow)
+    gamma = speed * flow.t / height
+    s_xx, s_yy, s_xy = slab.carried[:3, 1:-1, 1:-1]
+    assert s_xy == pytest.approx(shear_modulus * np.sin(gamma), abs=5e-3 * shear_modulus)
+    assert s_xx == pytest.approx(shear_modulus * (1 - np.cos(gamma)), abs=5e-3 * shear_modulus)
+    assert s_yy == pytest.approx(-s_xx, abs=5e-3 * shear_modulus)
 
 
 def test_five_layers_move_the_window_as_it_was_measured():

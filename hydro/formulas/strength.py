@@ -82,11 +82,12 @@ def compute_equivalent(s_xx, s_yy, s_xy):
 def return_to_yield(s_xx, s_yy, s_xy, shear, flow_stress, hardening):
     """Stress brought back to the yield surface along the radius, and the plastic strain for it.
 
-    flow_stress: Y; hardening: dY/d(plastic strain) [Pa].  Theory F20.10 [Wilkins1964].
+    flow_stress: Y; hardening: dY/d(plastic strain) [Pa].  Theory F20.10 [Wilkins1964].  Without a
+    shear modulus, as where it has melted, material bears no stress and strains no further.
     """
     equivalent = compute_equivalent(s_xx, s_yy, s_xy)
     excess = equivalent - flow_stress
     excess = excess if excess > 0.0 else 0.0
-    strain = excess / (3.0 * shear + hardening + TINY_IMPEDANCE)
-    part = 1.0 - 3.0 * shear * strain / (equivalent + TINY_IMPEDANCE)
+    strain = excess / (3.0 * shear + hardening + TINY_IMPEDANCE) if shear > 0.0 else 0.0
+    part = 1.0 - 3.0 * shear * strain / (equivalent + TINY_IMPEDANCE) if shear > 0.0 else 0.0
     return part * s_xx, part * s_yy, part * s_xy, strain

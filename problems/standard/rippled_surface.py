@@ -44,6 +44,7 @@ from shockgrid.problems.solids import (
     find_solid_material,
     idealise,
 )
+from shockgrid.regrid.measure.corners import compute_centres
 
 USUAL_CONSTANT = 0.29  # C of [Piriz2008]
 ARRESTS_UNTIL_END = 2.5  # the run lasts so many times the estimate of the time to the arrest
@@ -173,9 +174,7 @@ class RippledSurface(Problem):
         u = 0.0
         v = 0.0
         if deck.start == "velocity":
-            x, y = 0.25 * (
-                nodes[:, 1:, 1:] + nodes[:, :-1, 1:] + nodes[:, 1:, :-1] + nodes[:, :-1, :-1]
-            )
+            x, y = compute_centres(nodes)
             below = deck.speed * np.exp(self.k * (x - self.length))
             u = below * np.cos(self.k * y)
             v = -below * np.sin(self.k * y)

@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -298,10 +299,19 @@ def register(
     )
 
 
+@dataclass(frozen=True)
+class ColumnsWithUnits:
+    """A group of history columns, any callable, with the units of these."""
+
+    compute: Callable[..., Any]
+    units: Mapping[str, str]
+
+    def __call__(self, flow: Any) -> Any:
+        return self.compute(flow)
+
+
 def _register_columns(name: str, group: Callable[..., Any], units: dict[str, str]) -> None:
     """A group of history columns with its units."""
     if name in INSTALLED:
         raise BadInput(f"there is a group of history columns {name!r} already; choose another name")
-    if units:
-        group.units = units  # type: ignore[attr-defined]
-    REGISTERED[name] = group
+    REGISTERED[name] = ColumnsWithUnits(group, units) if units else group

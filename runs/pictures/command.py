@@ -25,7 +25,7 @@ from matplotlib.text import Text
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.text_files import escape_controls
 from shockgrid.runs.pictures import curves
-from shockgrid.runs.pictures.fields import View, draw_fields, time_titles
+from shockgrid.runs.pictures.fields import View, draw_fields, find_field, time_titles
 from shockgrid.runs.pictures.finishing import finish_figure
 from shockgrid.runs.quantities import add_unit, is_time
 from shockgrid.runs.store.files import check_folder, check_free, disk_errors
@@ -65,6 +65,8 @@ DEFAULT_TIMES = 4
 SLENDER_PICTURE_RATIO = 1000.0  # a picture's longer side over the other
 PANEL_PAD_INCHES = 0.1  # inches around each panel: less cuts titles at the edge
 FIRST_CHOICE = ("rho", "p")
+# of solids, whose density says little
+FIRST_CHOICE_OF_SOLIDS = ("von_mises", "p")
 
 
 Numbers = str | Sequence[float] | None  # of the command line, with commas between, or of Python
@@ -247,12 +249,16 @@ def find_deck_text(run: RunData) -> str | None:
 
 
 def default_fields(run: RunData) -> list[str]:
-    """The density if all dumps have it, else the first field that all have."""
+    """The density if all dumps have it, else the first field that all have; where all blocks are
+    solids, the von Mises stress and the pressure."""
     dumps = choose_dumps(run, None)
     names = [dump.field_names() for dump in dumps]
     known = [name for name in names[-1] if all(name in others for others in names)] or names[-1]
     if not known:
         raise BadInput(f"{run.path} has no fields to draw; try --what mesh")
+    blocks = [block for dump in dumps for block in dump.blocks]
+    if all(find_field(block, name) for block in blocks for name in FIRST_CHOICE_OF_SOLIDS):
+        return list(FIRST_CHOICE_OF_SOLIDS)
     return [next((name for name in FIRST_CHOICE if name in known), known[0])]
 
 

@@ -117,6 +117,16 @@ def compute_gradient(block: BlockData, name: str) -> np.ndarray:
     return np.array(solve(along_i, along_j, (x_i, y_i), (x_j, y_j), inverse))
 
 
+DEVIATORS = ("s_xx", "s_yy", "s_xy")
+
+
+def compute_von_mises(block: BlockData) -> np.ndarray:
+    """Equivalent stress (ni, nj) [Pa] of a block of solid."""
+    from shockgrid.hydro.formulas.strength import compute_equivalent  # numba: loaded if wanted
+
+    return compute_equivalent(*(block.cell_fields[name] for name in DEVIATORS))
+
+
 DERIVED = {
     "schlieren": Field(
         lambda block: np.hypot(*compute_gradient(block, "rho")),
@@ -129,6 +139,9 @@ DERIVED = {
     "vorticity": Field(  # 2 omega in solid rotation, also where y is a radius
         lambda block: compute_gradient(block, "v")[0] - compute_gradient(block, "u")[1],
         "1/s", "vorticity", ("u", "v"),
+    ),
+    "von_mises": Field(
+        compute_von_mises, "Pa", "von Mises stress", DEVIATORS,
     ),
     "rate": Field(
         lambda block: block.state_fields["rates"],

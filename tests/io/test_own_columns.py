@@ -66,6 +66,31 @@ def test_a_wrong_name_is_refused_before_the_run(file, name, sentence):
         sg.run("riemann", "run", output={"columns": [name]}, **DECK)
 
 
+class Counter:
+    """Something whose method is a group of history columns."""
+
+    def count(self, flow):
+        return {"blocks": len(flow.blocks)}
+
+
+@pytest.mark.parametrize("units", [None, {"blocks": "1"}])
+def test_a_bound_method_is_a_group_of_columns(file, monkeypatch, units):
+    monkeypatch.setitem(REGISTERED, "method-count", None)  # taken away at the end
+    sg.register("method-count", Counter().count, units=units)
+    run = sg.run("riemann", "run", output={"columns": ["method-count"]}, **DECK)
+    assert run.history.blocks.tolist() == [2] * 4
+
+
+def test_one_function_under_two_names_has_units_of_its_own_under_each(monkeypatch):
+    def measure(flow):
+        return {"width": 1.0}
+
+    for name, unit in (("in-metres", "m"), ("in-microns", "um")):
+        monkeypatch.setitem(REGISTERED, name, None)
+        sg.register(name, measure, units={"width": unit})
+    assert REGISTERED["in-metres"].units == {"width": "m"}
+
+
 def test_a_registered_function_is_a_group_of_columns(file, monkeypatch):
     monkeypatch.setitem(REGISTERED, "block-count", None)  # taken away at the end
     sg.register("block-count", lambda flow: {"blocks": len(flow.blocks)}, units={"blocks": "1"})

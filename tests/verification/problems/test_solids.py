@@ -135,6 +135,21 @@ def test_ripple_stops_at_a_height_as_the_inverse_of_the_flow_stress(yield_stress
     assert 0.22 < rows["constant"].computed < 0.30
 
 
+@pytest.mark.slow
+def test_heights_at_rest_are_a_straight_line_over_a_decade():
+    heights = {}
+    for yield_stress in (0.06e9, 0.2e9, 0.6e9):
+        law = f"law = 'perfect', shear_modulus = 47.7e9, yield_strength = {yield_stress}"
+        rows = run("rippled-surface", f"strength={{ {law} }}")
+        load = 8930.0 * 100.0**2 / yield_stress
+        heights[load] = rows["k_growth"].computed
+    (soft, middle, firm) = heights
+    slope = (heights[soft] - heights[firm]) / (soft - firm)
+    assert slope == pytest.approx(0.262, rel=0.04)
+    line = heights[firm] + slope * (middle - firm)
+    assert heights[middle] == pytest.approx(line, rel=0.03)
+
+
 @pytest.mark.parametrize(
     "deck, settings, words",
     [

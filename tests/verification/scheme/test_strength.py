@@ -147,6 +147,11 @@ def test_yield_brings_the_stress_back_along_the_radius(hardening):
     assert none == 0.0 and kept == pytest.approx(STRESS, rel=1e-15)
 
 
+def test_what_has_melted_loses_its_stress_without_plastic_strain():
+    molten = return_to_yield(3e8, -2e8, 1e8, 0.0, 0.0, 0.0)
+    assert molten == (0.0, 0.0, 0.0, 0.0)
+
+
 def test_a_gas_has_no_strength():
     with pytest.raises(BadInput, match="strength is for solids"):
         Block("air", IdealGas(1.4), box((0.0, 0.0), (1.0, 1.0), (4, 4)), 1, 0, 0, 1, strength=LAW)

@@ -33,8 +33,7 @@ class Gun(sg.Problem):
         return self.simulate([gas])
 
     def measure(self, evolution):
-        (gas,) = evolution.blocks
-        p = gas.cell_fields["p"][:, 0]
+        p = evolution["gas"].p[:, 0]
         shocked = p > 0.5 * (1.0 + p[0])
         return {"pressure": float(p[: max(1, shocked.sum() // 2)].mean())}
 

@@ -40,7 +40,16 @@ from shockgrid.hydro.mixture.sides import RIM_FIELDS
 from shockgrid.hydro.perimeter.contacts import fill_open_flux
 from shockgrid.hydro.perimeter.plan import PerimeterPlan
 from shockgrid.hydro.rim import RHO_BEYOND, find_first_face, make_rim
-from shockgrid.hydro.rows import HELD_ARRAYS, MIXED_TOTAL_ROWS, RHO, TOTAL_ROWS, P, make_held
+from shockgrid.hydro.rows import (
+    HELD_ARRAYS,
+    MIXED_TOTAL_ROWS,
+    RHO,
+    TOTAL_ROWS,
+    P,
+    U,
+    V,
+    make_held,
+)
 from shockgrid.hydro.strength.laws.base import StrengthLaw
 from shockgrid.hydro.strength.spall.base import SpallLaw
 from shockgrid.hydro.strength.stress import Stress, add_stress_fields, stiffen_wave_law
@@ -414,7 +423,27 @@ class Block:
         """Largest rate [1/s] of the cells updated by this process: the inverse of their step."""
         return float(self.rates[self.rows.start : self.rows.stop].max())
 
-    # --- fields for pictures and dumps -----------------------------------------------------------
+    # --- fields for problems, pictures and dumps -------------------------------------------------
+
+    @property
+    def rho(self) -> np.ndarray:
+        """Density (ni, nj) [kg/m3], a view of the state."""
+        return self.state[RHO, 1:-1, 1:-1]
+
+    @property
+    def u(self) -> np.ndarray:
+        """Velocity along x (ni, nj) [m/s], a view of the state."""
+        return self.state[U, 1:-1, 1:-1]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity along y (ni, nj) [m/s], a view of the state."""
+        return self.state[V, 1:-1, 1:-1]
+
+    @property
+    def p(self) -> np.ndarray:
+        """Pressure (ni, nj) [Pa], a view of the state."""
+        return self.state[P, 1:-1, 1:-1]
 
     @property
     def cell_fields(self) -> Mapping[str, np.ndarray]:

@@ -32,7 +32,7 @@ from shockgrid.hydro.sources import BodySource, SourceFunction
 from shockgrid.hydro.step import Flow, take_step
 from shockgrid.hydro.workers import Workers
 from shockgrid.regrid.compilation.first_calls import is_interpreting
-from shockgrid.regrid.errors import BadInput, Place, RunFailure
+from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.sides import SIDE_NAMES
 
 LEAST_STEP_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
@@ -237,6 +237,14 @@ class Simulation:
         """The whole blocks; with several ranks they are collected from their owners."""
         self._shared.collect()
         return self._blocks
+
+    def __getitem__(self, name: str) -> Block:
+        """The block of this name: `simulation["gas"].rho`; BadInput for an unknown one."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        names = [block.name for block in self.blocks]
+        raise BadInput(f"there is no block {name!r}{suggest(str(name), names)}")
 
     @property
     def flow(self) -> Flow:

@@ -197,7 +197,7 @@ class RadialProblem(Problem):
         places = [((n + 0.5) / CELL_MEAN_POINTS, 1.0) for n in range(CELL_MEAN_POINTS)]
         exact = average_points(block.nodes, places, sample)
         weight = block.volume * (self.compute_radii(block.centres) < within)
-        error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
+        error = np.abs(block.rho - exact)
         whole = float((exact * weight).sum())
         return float((error * weight).sum()) / whole if whole > 0.0 else math.nan
 
@@ -216,7 +216,7 @@ class RadialProblem(Problem):
         is denser than the cold gas.
         """
         r = self.compute_radii(block.centres)
-        rho = block.state[0, 1:-1, 1:-1]
+        rho = block.rho
         level = 0.5 * (1.0 + float(rho.max()))
         lines = [*zip(r.T, rho.T, strict=True), *zip(r, rho, strict=True)]
         found = np.array([find_crossing(*line, level) for line in lines])

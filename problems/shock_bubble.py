@@ -268,12 +268,12 @@ class ShockBubble(Problem):
         """
         blocks = {block.name: block for block in evolution.blocks}
         lines = west, _, east = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
-        axis = [(blocks[name].nodes[0, :, 0], blocks[name].state[3, 1:-1, 1]) for name in AXIS]
+        axis = [(blocks[name].nodes[0, :, 0], blocks[name].p[:, 0]) for name in AXIS]
         lid = blocks["air-north"]
         wall = [
-            (blocks["upwind"].nodes[0, :, -1], blocks["upwind"].state[3, 1:-1, -2]),
-            (lid.nodes[0, -1, ::-1], lid.state[3, -2, -2:0:-1]),
-            (blocks["downwind"].nodes[0, :, -1], blocks["downwind"].state[3, 1:-1, -2]),
+            (blocks["upwind"].nodes[0, :, -1], blocks["upwind"].p[:, -1]),
+            (lid.nodes[0, -1, ::-1], lid.p[-1, ::-1]),
+            (blocks["downwind"].nodes[0, :, -1], blocks["downwind"].p[:, -1]),
         ]
         return {
             "upwind": float(west[0, 0]),

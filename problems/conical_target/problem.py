@@ -189,9 +189,9 @@ class ConicalTarget(seen.Results, Problem):
         cone = blocks["cone"]
         measured = {name: seen.measure_peak(block) for name, block in blocks.items()}
         greatest, x, y, transformed = measured["cone"]
-        row = {"pressure_impact": float(front.state[3, 2, 1]), "greatest_pressure": greatest}
+        row = {"pressure_impact": float(front.p[1, 0]), "greatest_pressure": greatest}
         row |= {"greatest_x": x, "greatest_y": y}
-        p = cone.state[3, 1:-1, 1:-1]
+        p = cone.p
         axis = cone.centres[0, :, 0]
         ends = cone.nodes[0, [0, -1], 0]
         for number, part in enumerate(seen.GAUGES):
@@ -235,7 +235,7 @@ def measure_front(block: Block, row: int, threshold: float, speed: float) -> tup
     the BEHIND cells behind; NaN before the shock is in the row, and as soon as the row's last cell
     moves faster than `speed` [m/s].
     """
-    p = block.state[3, 1:-1, 1:-1][:, row]
+    p = block.p[:, row]
     u, v = block.state[1:3, -2, 1:-1][:, row]
     x = find_crossing(block.centres[0, :, row], p, threshold)
     if math.isnan(x) or math.hypot(u, v) > speed:

@@ -407,7 +407,7 @@ class Results:
             windows.append((middle - reach, middle + reach))
             for block in dump.blocks:
                 inside = np.abs(compute_centres(block.nodes)[0] - middle) <= reach
-                shown.append(block.cell_fields["rho"][inside])
+                shown.append(block.rho[inside])
         rho = np.concatenate(shown)
         for axes, (dump, curves), window in zip(panels, drawn, windows, strict=True):
             title = f"density and grid, {self.scale_time(dump.t)}"

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from shockgrid.hydro.eos.mixture import MASS_FRACTION, VOLUME_FRACTION
-from shockgrid.hydro.rows import RHO, U
 from shockgrid.problems.interface_instability.deck import InterfaceDeck
 from shockgrid.problems.interface_instability.spacing import FINE_ZONE_WAVELENGTHS, Spacing
 from shockgrid.problems.pictures import CONTACT_FRACTION, trace_contact
@@ -199,7 +198,7 @@ def measure_circulation(blocks: Any, heights: np.ndarray) -> float:
     """
     flow = np.zeros(heights.size - 1)
     for block in blocks:
-        add_to_rows(block.nodes, block.volume * block.state[U, 1:-1, 1:-1], heights, flow)
+        add_to_rows(block.nodes, block.volume * block.u, heights, flow)
     along = flow / np.diff(heights)
     return find_peak(along, 1.0 / 12.0) + find_peak(-along, 1.0 / 12.0)
 
@@ -215,7 +214,7 @@ def measure_zone(block: Any, heights: np.ndarray) -> dict[str, float]:
     fraction = block.carried[VOLUME_FRACTION, 1:-1, 1:-1]
     part = block.carried[MASS_FRACTION, 1:-1, 1:-1]
     volume = block.volume
-    mass = volume * block.state[RHO, 1:-1, 1:-1]
+    mass = volume * block.rho
     profile = (volume * fraction).sum(axis=1) / volume.sum(axis=1)
     widths = volume.sum(axis=1) / np.ptp(block.nodes[1, 0])
     # between its means the profile is straight: of its square, the mean over a cell is larger

@@ -440,7 +440,7 @@ class Results:
         """Pressure with the grid at several times, all in one frame."""
         panels = _make_panels(figure, run)
         last = run.dumps[-1].blocks
-        top = max(float(np.percentile(block.cell_fields["p"], 99.5)) for block in last)
+        top = max(float(np.percentile(block.p, 99.5)) for block in last)
         top = 1.1 * self.collision.p if self.collision.attached else top
         colours = Colours(unit=1e9, low=0.0, high=top / 1e9, map="turbo")
         for axes, dump in panels:

@@ -102,9 +102,9 @@ class PlateRun(Simulation):
     def measure_jet(self) -> tuple[float, int, float]:
         """Greatest speed in the plate [m/s], cells of its jet and their mass [kg/m]."""
         plate = self.blocks[0]
-        speed = np.hypot(*plate.state[1:3, 1:-1, 1:-1])
+        speed = np.hypot(plate.u, plate.v)
         fast = speed > report.JET_SPEED_RATIO * self.problem.plate_speed
-        mass = float((plate.volume * plate.state[0, 1:-1, 1:-1])[fast].sum())
+        mass = float((plate.volume * plate.rho)[fast].sum())
         return float(speed.max()), int(fast.sum()), mass
 
     def measure(self) -> dict[str, float]:
@@ -174,7 +174,7 @@ class PlateRun(Simulation):
         the straight line from A through these places.
         """
         nodes = block.nodes
-        p = block.state[3, 1:-1, 1:-1]
+        p = block.p
         rows = np.arange(*SHOCK_ROWS)
         rows = -1 - rows[rows < block.nj] if in_wedge else rows[rows < block.nj]
         low, high = np.sort((rows[0], rows[-1])) + (block.nj if in_wedge else 0)

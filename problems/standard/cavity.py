@@ -92,7 +92,8 @@ class Cavity(Problem):
     def measure(self, evolution) -> dict[str, float]:
         (block,) = evolution.blocks
         x = block.nodes[0, :, 0]
-        _, u, _, p = block.state[:, 1:-1, 1:-1]
+        u = block.u
+        p = block.p
         size = measure_below(block.nodes[:, :, 0], self.curved)
         width = float(x[-1] - x[0])
         row = {"void_size": size, "void_width": width, "jet_speed": float(u[0, 0])}

@@ -88,7 +88,7 @@ class Detonation(Problem):
         """Place of the front on the lower side, pressure behind it or at its peak, mean error."""
         (block,) = evolution.blocks
         x = block.centres[0][:, 0]
-        p = block.state[3, 1:-1, 1]
+        p = block.p[:, 0]
         front = find_crossing(x, p, 0.5 * self.pressure)
         pressure = float(p.max())
         if self.deck.behind == "piston" and math.isfinite(front):

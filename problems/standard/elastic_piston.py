@@ -203,7 +203,7 @@ class ElasticPiston(Problem):
         for dump in choose_even_dumps(run_data, 4):
             block = dump.blocks[0]
             x = 1e3 * block.centres[0][:, 0]
-            above.plot(x, block.cell_fields["u"][:, 0], lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
+            above.plot(x, block.u[:, 0], lw=1.4, label=f"{1e6 * dump.t:.3g} µs")
             below.plot(x, 1e-9 * find_stress(block)[:, 0], lw=1.4)
             if dump.t > 0.0:
                 places, speeds, stresses = self.make_profile(dump.t)

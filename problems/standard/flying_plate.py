@@ -181,7 +181,7 @@ class FlyingPlate(Problem):
         """Velocities at the places, of the target's back, and the places of both fronts [m]."""
         (block,) = evolution.blocks
         x = block.centres[0].mean(axis=1)
-        u = block.cell_fields["u"].mean(axis=1)
+        u = block.u.mean(axis=1)
         row = {"back_speed": float(u[-1])}
         levels = {"precursor_place": math.nan, "plastic_place": math.nan}
         if len(self.waves) == 2:
@@ -253,7 +253,7 @@ class FlyingPlate(Problem):
         dump = min(run_data.dumps, key=lambda one: abs(one.t - deck.profile))
         block = dump.blocks[0]
         x = block.centres[0][:, 0] / ONE_MILLIMETRE
-        left.plot(x, block.cell_fields["u"][:, 0], lw=1.4, label="computed")
+        left.plot(x, block.u[:, 0], lw=1.4, label="computed")
         left.set(xlabel="x [mm]", ylabel="u [m/s]", title=f"t = {dump.t / ONE_MICROSECOND:.3g} µs")
         history = run_data.history
         right.plot(history["t"] / ONE_MICROSECOND, history["back_speed"], lw=1.4, label="computed")

@@ -89,7 +89,7 @@ class Kidder(RadialProblem):
             row[f"{side}_worst"] = float(np.abs(part - 1.0).max())
             row[f"{side}_roundness"] = float(np.ptp(part))
         exact = self.shell.compute_density(self.compute_layers(block.nodes), evolution.t)
-        error = np.abs(block.state[0, 1:-1, 1:-1] / exact - 1.0)
+        error = np.abs(block.rho / exact - 1.0)
         return {**row, "error_rho": float(np.average(error, weights=block.volume))}
 
     def report(self, run) -> Report:

@@ -99,7 +99,7 @@ class Noh(RadialProblem):
         r = self.compute_radii(block.centres)
         weight = block.volume * ((r > 0.3 * shock) & (r < 0.8 * shock))
         row = dict.fromkeys(("density_behind", "pressure_behind"), math.nan)
-        for name, cells in zip(row, block.state[[0, 3], 1:-1, 1:-1], strict=True):
+        for name, cells in zip(row, (block.rho, block.p), strict=True):
             if weight.any():
                 row[name] = float(np.average(cells, weights=weight))
         return {**row, "error_rho": self.measure_error(evolution, 2.0 * shock)}

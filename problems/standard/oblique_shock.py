@@ -102,7 +102,7 @@ class ObliqueShock(Problem):
         """Pressure on the last half of the wedge over the exact one, and the shock's angle."""
         (block,) = evolution.blocks
         x, y = block.centres
-        p = block.state[3, 1:-1, 1:-1]
+        p = block.p
         x = x[:, 0]
         level = 0.5 * (self.ahead + self.pressure)
         heights = np.array([find_crossing(*column, level) for column in zip(y, p, strict=True)])

@@ -196,7 +196,7 @@ class RippledSurface(Problem):
         """Amplitude [m] of the surface and its rate [m/s]."""
         (block,) = evolution.blocks
         surface = block.nodes[0, -1]
-        u = block.cell_fields["u"][-1]
+        u = block.u[-1]
         return {
             "amplitude": 0.5 * float(surface[0] - surface[-1]),
             "growth_rate": 0.5 * float(u[0] - u[-1]),

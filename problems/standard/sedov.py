@@ -88,7 +88,7 @@ class Sedov(RadialProblem):
     def measure(self, evolution) -> dict[str, float]:
         """Radius of the shock and at the end the error."""
         (block,) = evolution.blocks
-        most = float(block.state[0, 1:-1, 1:-1].max())
+        most = float(block.rho.max())
         found = {"shock_radius": self.find_shock(block), "most_density": most}
         return {**found, "error_rho": self.measure_error(evolution)}
 

@@ -71,7 +71,7 @@ class Vortex(Problem):
             return {"error_rho": math.nan}
         (block,) = evolution.blocks
         exact = self.exact.compute_cell_averages(block.nodes, evolution.t)[0]
-        error = np.abs(block.state[0, 1:-1, 1:-1] - exact)
+        error = np.abs(block.rho - exact)
         return {"error_rho": float(np.average(error, weights=block.volume))}
 
     def report(self, run) -> Report:

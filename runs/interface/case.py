@@ -373,6 +373,10 @@ class Case(Drawn):
         units = self.problem.t_unit != "1"
         return Blocks({b.name: _view(b, axes, units) for b in self.simulation.blocks})
 
+    def __getitem__(self, name: str) -> BlockData:
+        """A block by its name, as of a dump: `case["second"].rho`."""
+        return self.blocks[name]
+
     @property
     def dumps(self) -> list[Snapshot]:
         """The current state only, in the form that pictures use."""

@@ -22,6 +22,9 @@ from shockgrid.regrid.work_arrays import share_memory
 
 MOST_CELL_HALVINGS = 8
 MOST_RETURN_ROUNDS = 24  # at most, in which nodes of folded cells return to the new grid
+# local spacings that the limit allows, below which a step is a short one: folded cells then stay
+# where they are if they can, as the way to the new grid is finite in a step of any length
+SHORT_STEP_SPACINGS = 0.03
 MOST_BLENDS = 12  # halvings of the distance to the new grid for all nodes if folds persist
 # factor of the limit for nodes of cells that would otherwise be sharpened
 LOOSENED_LIMIT_FACTOR = 2.0
@@ -323,7 +326,10 @@ class MotionLimiter:
         for _ in range(MOST_CELL_HALVINGS):
             if relax_sharpened(old, loosened, limited, first, last, self.marks) == 0:
                 break
-        # folded ones go back to `new`
+        # folded ones stay where they are in a short step
+        if most_spacings < SHORT_STEP_SPACINGS and self._hold_folded(old, limited, loosened):
+            return loosened, count
+        # else they go back to `new`
         for halvings in range(MOST_RETURN_ROUNDS):
             all_the_way = halvings >= MOST_CELL_HALVINGS
             if release_folded(new, limited, first, last, all_the_way, self.marks) == 0:
@@ -339,6 +345,23 @@ class MotionLimiter:
             if len(find_bad_cells(loosened)) == 0:
                 return loosened, count
         return new, 0
+
+    def _hold_folded(self, old: np.ndarray, limited: np.ndarray, out: np.ndarray) -> bool:
+        """Fill `out` with `limited`, but nodes of folded cells as in `old`; whether none is left.
+
+        Where a corner is nearly straight, or a cell nearly flat, the motion of its neighbours
+        folds it however little they move.
+        """
+        out[...] = limited
+        # all inner nodes may be held
+        first = self.loosened_first
+        last = self.loosened_last
+        first[:] = 1
+        last[:] = old.shape[2] - 2
+        for _ in range(MOST_RETURN_ROUNDS):
+            if release_folded(old, out, first, last, True, self.marks) == 0:
+                return True
+        return False
 
 
 @dataclass(frozen=True)

@@ -76,6 +76,20 @@ def test_a_flat_corner_opens_without_a_jump():
     assert 1e-3 < np.abs(held - old).max() < 2e-2
 
 
+def test_a_flat_corner_does_not_jump_in_a_short_step():
+    """The motion of the sides turns it over, and the way to the new grid is half a cell."""
+    old = unit_steps(6, 6)
+    new = old.copy()
+    old[:, 3, 3] = 3.5 - 1e-7
+    x = np.arange(7.0)
+    motion = 1e-4 * x * (6.0 - x) / 9.0
+    new[:, :, 0] += motion
+    new[:, :, -1] += motion
+    held, count = MotionLimiter(old.shape).limit(old, new, 1e-6)
+    assert count > 0 and len(find_bad_cells(held)) == 0
+    assert np.abs(held - old).max() < 2.0 * motion.max()
+
+
 WEIGHT = "(1 + 10*x)*(1 + 5*y)"
 
 

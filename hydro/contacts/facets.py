@@ -180,8 +180,8 @@ def compute_outline_normal(points, beyond, k):
 def is_round_corner(points, beyond, k, line, other_nodes, a, deep):
     """Whether node `k`, `deep` [m] behind face `a` of a line, has come in through the next side.
 
-    So it is at a corner of the other body, where the next side looks at the node and is nearer to
-    it by the way against the node's normal.  Lines go on where their ends are mirrored.
+    So it is at a corner of the other body, where the next side looks at the node, has its foot and
+    is nearer to it by the way against the node's normal.  Lines go on where ends are mirrored.
     """
     last = line.shape[1] - 2
     for end, end_face in ((0, 0), (1, last)):
@@ -196,7 +196,8 @@ def is_round_corner(points, beyond, k, line, other_nodes, a, deep):
         normal_x, normal_y = compute_outline_normal(points, beyond, k)
         facing = -(normal_x * next_x + normal_y * next_y)
         next_deep = (x - points[0, k]) * next_x + (y - points[1, k]) * next_y
-        if facing <= LEAST_FACING or next_deep < 0.0:
+        along = (points[0, k] - x) * (x_beyond - x) + (points[1, k] - y) * (y_beyond - y)
+        if facing <= LEAST_FACING or next_deep < 0.0 or along <= 0.0:
             continue
         face_x, face_y = compute_normal(line, a, 1.0)
         face_facing = -(normal_x * face_x + normal_y * face_y)

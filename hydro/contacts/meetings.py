@@ -17,7 +17,7 @@ import numpy as np
 
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.contacts.overlap import Overlaps
-from shockgrid.hydro.contacts.pair import Pair, PlanePair
+from shockgrid.hydro.contacts.pair import MOST_BEHIND, Pair, PlanePair
 from shockgrid.hydro.contacts.parting import Bodies
 from shockgrid.hydro.contacts.start import fill_normals
 from shockgrid.hydro.contacts.surface import Plane, Surface, find_planes, is_surface
@@ -89,6 +89,8 @@ class Meetings:
         self._largest_motion = 0.0  # of two lines towards each other in this step
         self._read: set[int] = set()  # surfaces whose lines are those of the present grid
         self._touch_retries = 0
+        self._overlapping: set[tuple[int, int]] = set()  # bodies, by number, after the last step
+        self._overlaps_are_current = False
         self.made = self.opened = 0
         self.length = 0.0
         self.overlap = 0.0  # of bodies, in cells
@@ -121,26 +123,49 @@ class Meetings:
         return moved
 
     def find(self, t: float, step: int) -> set[frozenset[int]]:
-        """Facets of the present grid; the pairs of blocks (by id) that touch, before a step.
+        """Facets of the present grid; the pairs of blocks (by id) that are near, before a step.
+
+        What these have in common is measured here, and lines that cross are no sign of failure.
 
         Raises RunFailure where two lines have crossed each other too far to go on.
         """
         if self.pairs and not self._facets_are_current:
             self._find(step)
-            for pair in self.with_pins:
-                crossing = pair.find_crossing()
-                if crossing:
-                    surface, other_surface, node = crossing
-                    x, y = surface.line[:, node]
-                    raise RunFailure(
-                        f"contact: {surface.segment} has come through {other_surface.segment} at "
-                        f"x = {x:.6g} m, y = {y:.6g} m, t = {t:.6g} s (step {step}): the lines "
-                        "bend there within a cell",
-                        cause="blocks-overlap",
-                        place=Place(surface.block.name, side=surface.segment.side),
-                    )
-        blocks = [(pair.leader.block, pair.follower.block) for pair in self.with_pins]
-        return {frozenset(map(id, both)) for both in blocks}
+            if not self._overlaps_are_current:
+                self._measure_overlaps(of_all=True)
+                self._overlaps_are_current = True
+            self._check_depths(t, step)
+        near = [pair for pair in self.pairs if pair.is_near or self._overlap_now(pair)]
+        return {frozenset((id(pair.leader.block), id(pair.follower.block))) for pair in near}
+
+    def _overlap_now(self, pair: Pair) -> bool:
+        """Whether the bodies of a pair lie in each other, as measured last."""
+        if not self._overlapping or pair.one_body or isinstance(pair, PlanePair):
+            return False
+        return self._get_bodies(pair) in self._overlapping
+
+    def _check_depths(self, t: float, step: int) -> None:
+        """Raise RunFailure where one body lies too far in another to go on."""
+        for pair in self.with_pins:
+            crossing = pair.find_crossing()
+            if crossing:
+                self._raise_lost(
+                    crossing[0], crossing[1], crossing[0].line[:, crossing[2]], t, step
+                )
+        if self.overlaps.deepest > MOST_BEHIND:
+            node = self.overlaps.deepest_node
+            surface = self.bodies.find_surface(node)
+            self._raise_lost(surface, "another body", self.bodies.outlines.nodes[:, node], t, step)
+
+    @staticmethod
+    def _raise_lost(surface: Surface, other: object, place: np.ndarray, t: float, step: int):
+        x, y = place
+        raise RunFailure(
+            f"contact: {surface} has come through {other} at x = {x:.6g} m, y = {y:.6g} m, "
+            f"t = {t:.6g} s (step {step}): the lines bend there within a cell",
+            cause="blocks-overlap",
+            place=Place(surface.block.name, side=surface.segment.side),
+        )
 
     # --- phases of a step ------------------------------------------------------------------------
 
@@ -192,7 +217,8 @@ class Meetings:
             return proposed_dt
         self._lay_hits(awake, first_touch, part_back)
         # bodies that lie in each other even so
-        if any(pair.has_hits or pair in self.with_pins for pair in awake if not pair.one_body):
+        between_bodies = [pair for pair in awake if not pair.one_body]
+        if self._overlapping or any(p.has_hits or p in self.with_pins for p in between_bodies):
             sound = max(float(surface.segment.rim.c.max()) for surface in self.surfaces)
             self.bodies.push_apart(self._largest_motion + PUSHED_SOUND_PART * sound * dt)
         # what that has changed beside them
@@ -203,7 +229,7 @@ class Meetings:
         return None
 
     def _find_awake_pairs(self) -> list[Pair]:
-        """The pairs that may meet in a step that is somewhat longer than this one."""
+        """The pairs that may meet in a step somewhat longer than this one, or overlap already."""
         for regridder, _ in self._folding:
             regridder.meets_itself = False
         for surface in self.surfaces:
@@ -214,7 +240,11 @@ class Meetings:
         for pair in self.pairs:
             pair.clearance -= self._moved_since
         self._moved_since = 0.0
-        return [pair for pair in self.pairs if pair.may_touch(MOST_LENGTHENING)]
+        return [
+            pair
+            for pair in self.pairs
+            if pair.may_touch(MOST_LENGTHENING) or self._overlap_now(pair)
+        ]
 
     def _lay_pins(self, awake: list[Pair], part_back: float) -> None:
         """Keep the nodes that are in contact on the other line."""
@@ -334,6 +364,7 @@ class Meetings:
         self._facets_are_current = False
         self.length = 0.0
         self.overlap = 0.0
+        self.overlaps.deepest = 0.0
         if MOST_LENGTHENING * self._largest_motion < self._least_clearance:
             self._least_clearance -= self._largest_motion
             self._moved_since += self._largest_motion
@@ -348,22 +379,34 @@ class Meetings:
             self.opened += max(0, pair.stretches - stretches)
             pair.stretches = stretches
         self._measure_overlaps()
-        self._least_clearance = min(0.0 if pair.is_near else pair.clearance for pair in self.pairs)
+        clearances = [0.0 if pair.is_near else pair.clearance for pair in self.pairs]
+        self._least_clearance = 0.0 if self._overlapping else min(clearances)
 
-    def _measure_overlaps(self) -> None:
-        """How much of bodies lies in others, all together, in cells of the finer of both."""
+    def _measure_overlaps(self, of_all: bool = False) -> None:
+        """How much of bodies lies in others, all together, in cells of the finer of both.
+
+        Looked at are bodies that are near each other or overlap already, or those of all pairs.
+        """
         cells: dict[tuple[int, int], float] = {}
         for pair in self.pairs:
-            met = pair.has_hits or pair in self.with_pins
-            if not met or pair.one_body or isinstance(pair, PlanePair):
+            if pair.one_body or isinstance(pair, PlanePair):
                 continue
-            both = pair.leader, pair.follower
-            numbers = tuple(sorted(self.bodies.get_number(surface) for surface in both))
-            cell = min(surface.measure_cell() for surface in both)
-            cells[numbers] = min(cell, cells.get(numbers, np.inf))
+            both = self._get_bodies(pair)
+            if of_all or pair.has_hits or pair.is_near or both in self._overlapping:
+                cell = min(surface.measure_cell() for surface in (pair.leader, pair.follower))
+                cells[both] = min(cell, cells.get(both, np.inf))
         areas = self.overlaps.measure(list(cells)) if cells else []
-        for area, cell in zip(areas, cells.values(), strict=True):
+        self._overlapping = set()
+        self.overlap = 0.0
+        for (both, cell), area in zip(cells.items(), areas, strict=True):
             self.overlap += area / cell
+            if area > 0.0:
+                self._overlapping.add(both)
+
+    def _get_bodies(self, pair: Pair) -> tuple[int, int]:
+        """The numbers of the bodies of both surfaces, the lower one first; no plane's."""
+        number, other_number = map(self.bodies.get_number, (pair.leader, pair.follower))
+        return min(number, other_number), max(number, other_number)
 
     # --- parts -----------------------------------------------------------------------------------
 
@@ -459,6 +502,7 @@ class Meetings:
     def set_state(self, state: Any) -> None:
         """Take up a state of `get_state`; a restart point without one had met nothing."""
         self._facets_are_current = False
+        self._overlaps_are_current = False
         self._least_clearance = 0.0
         self._moved_since = 0.0
         for pair in self.pairs:

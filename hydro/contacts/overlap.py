@@ -66,6 +66,22 @@ def fill_depths(outlines, body, other_body, reach, depths, nearest_faces):
             depths[node] = least**0.5
 
 
+@kernel
+def find_deepest(outlines, body, depths, nearest_faces):
+    """The node of a body that is furthest in another one, in lengths of the face there: (node,
+    depth)."""
+    deepest = 0.0
+    deepest_node = NO_FACE
+    for node in range(depths.shape[0]):
+        if outlines.bodies[node] != body or depths[node] <= 0.0:
+            continue
+        depth = depths[node] / measure_square(outlines.nodes, nearest_faces[node]) ** 0.5
+        if depth > deepest:
+            deepest = depth
+            deepest_node = node
+    return deepest_node, deepest
+
+
 @compiled_once
 def is_chord(outlines, start, depth, depths):
     """Whether a face is a chord of the other outline, which bulges by `depth` [m] beyond it.
@@ -110,19 +126,30 @@ def sum_behind(outlines, body, depths, nearest_faces):
 
 
 class Overlaps:
-    """Measures by how much bodies lie in each other; `bodies`: their outlines."""
+    """Measures by how much bodies lie in each other; `bodies`: their outlines.
+
+    deepest: the furthest that a node lies in another body, in lengths of the face there, as of the
+    last `measure`; deepest_node: its number in the outlines.
+    """
 
     def __init__(self, bodies: Bodies):
         self.bodies = bodies
         count = bodies.outlines.nodes.shape[1]
         self._depths = np.zeros(count)
         self._nearest_faces = np.full(count, NO_FACE)
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing has been measured."""
+        self.deepest = 0.0
+        self.deepest_node = NO_FACE
 
     def measure(self, pairs: list[tuple[int, int]]) -> list[float]:
         """Areas [m²] that pairs of bodies, by their numbers, have in common after a step.
 
         By the nodes of that outline which has more in the other body.
         """
+        self.forget()
         self.bodies.read()
         outlines: Outlines = self.bodies.outlines
         reach = DEEPEST_FACES * float(fill_face_boxes.entry(outlines))
@@ -132,6 +159,10 @@ class Overlaps:
                 fill_depths.entry(
                     outlines, body, other_body, reach, self._depths, self._nearest_faces
                 )
+                node, depth = find_deepest.entry(outlines, body, self._depths, self._nearest_faces)
+                if depth > self.deepest:
+                    self.deepest = float(depth)
+                    self.deepest_node = int(node)
             both = [
                 float(sum_behind.entry(outlines, body, self._depths, self._nearest_faces))
                 for body in pair

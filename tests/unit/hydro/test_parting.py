@@ -9,6 +9,7 @@ from shockgrid.hydro.contacts.necks import THINNEST_CELL_PART, Necks
 from shockgrid.hydro.contacts.parting import DEEPEST_NODE_PART
 from shockgrid.hydro.motion.overlaps import is_inside
 from shockgrid.hydro.simulation import Simulation
+from shockgrid.regrid.errors import RunFailure
 from shockgrid.regrid.sides import trace_outline
 
 SIDES = "i_min", "i_max", "j_min", "j_max"
@@ -152,3 +153,27 @@ def test_nodes_that_crowd_at_a_corner_are_no_neck():
     body.nodes[:, 1, 0] = 0.1, 0.0
     body.nodes[:, 0, 1] = 0.1, near
     assert necks.find_cut() is not None
+
+
+@pytest.mark.parametrize("depth", [0.08, 0.15, 0.3])
+def test_corners_that_overlap_are_parted(depth):
+    """Lines of the corners cross, near or far from being pins of each other: no step fails."""
+    bodies = make_boxes((0.0, 0.0), (1.0, 1.0), apart=0.1)
+    simulation = Simulation(bodies, [], t_end=1.0)
+    bodies[1].nodes[0] -= 0.3 + 0.1 * depth
+    bodies[1].nodes[1] -= 0.1 * depth
+    rows = [simulation.advance() for _ in range(8)]
+    overlaps = [row["contact_overlap"] for row in rows]
+    assert max(overlaps) < depth**2
+    assert overlaps[-1] < 3e-3
+
+
+def test_bodies_deep_in_each_other_end_the_run():
+    bodies = make_boxes((0.0, 0.0), (1.0, 1.0), apart=0.1)
+    simulation = Simulation(bodies, [], t_end=1.0)
+    bodies[1].nodes[0] -= 0.3 + 0.12
+    bodies[1].nodes[1] -= 0.12
+    with pytest.raises(RunFailure) as failure:
+        for _ in range(3):
+            simulation.advance()
+    assert failure.value.cause == "blocks-overlap"

@@ -250,3 +250,20 @@ def test_five_layers_move_the_window_as_it_was_measured():
     assert np.sqrt(np.mean(differences**2)) < 0.08 * problem.deck.speed
     # what tells a wall behind the window from a free face
     assert rows[-2].computed == pytest.approx(-44.9, abs=3.0)
+
+
+@pytest.mark.slow
+def test_a_tube_expands_around_slugs_that_part_from_it():
+    settings = "block.0.cells=[60,8]", "block.1.cells=[60,4]", "run.t_end=8e-6", "gauge=[]"
+    problem = read_deck("blocks-expanding-tube", settings).make_problem()
+    flow = problem.build()
+    history = march_measured(problem, flow)
+    _, tube = flow.blocks
+    outside = tube.nodes[1, :, -1]
+    middle = np.abs(tube.nodes[0, :, -1] - 0.0254) < 3e-3
+    # it bulges where the slugs met, by what measured speeds add up to and half as much again
+    assert 1.1e-3 < outside[middle].max() - 9.35e-3 < 2.2e-3
+    assert outside[-5:] == pytest.approx(9.35e-3, abs=1e-4)
+    # and has left the slug behind it
+    assert history["contacts_opened"][-1] > 0
+    assert np.ptp(history["total_energy"]) < 1e-12 * history["total_energy"][0]

@@ -92,6 +92,9 @@ class Meetings:
         self._overlapping: set[tuple[int, int]] = set()  # bodies, by number, after the last step
         self._overlaps_are_current = False
         self.made = self.opened = 0
+        self._pushed_now = 0  # in this step
+        self.pushed_nodes = 0  # since the start, and the area in cells that faces swept with them
+        self.pushed_area = 0.0
         self.length = 0.0
         self.overlap = 0.0  # of bodies, in cells
 
@@ -206,6 +209,7 @@ class Meetings:
         """
         if not self.pairs:
             return None
+        self._pushed_now = 0
         awake = self._find_awake_pairs()
         if not awake:
             self._touch_retries = 0
@@ -220,7 +224,9 @@ class Meetings:
         between_bodies = [pair for pair in awake if not pair.one_body]
         if self._overlapping or any(p.has_hits or p in self.with_pins for p in between_bodies):
             sound = max(float(surface.segment.rim.c.max()) for surface in self.surfaces)
-            self.bodies.push_apart(self._largest_motion + PUSHED_SOUND_PART * sound * dt)
+            self._pushed_now = self.bodies.push_apart(
+                self._largest_motion + PUSHED_SOUND_PART * sound * dt
+            )
         # what that has changed beside them
         for guard in self.guards:  # of bodies' corners, which the laying may have opened
             guard.hold()
@@ -378,6 +384,9 @@ class Meetings:
             self.made += max(0, stretches - pair.stretches)
             self.opened += max(0, pair.stretches - stretches)
             pair.stretches = stretches
+        if self._pushed_now:
+            self.pushed_nodes += self._pushed_now
+            self.pushed_area += self.bodies.swept
         self._measure_overlaps()
         clearances = [0.0 if pair.is_near else pair.clearance for pair in self.pairs]
         self._least_clearance = 0.0 if self._overlapping else min(clearances)
@@ -477,6 +486,8 @@ class Meetings:
             "contacts_opened": self.opened,
             "contact_length": self.length,
             "contact_overlap": self.overlap,
+            "contact_pushed_nodes": self.pushed_nodes,
+            "contact_pushed_area": self.pushed_area,
             **self.voids.compute_row(),
         }
 
@@ -489,6 +500,7 @@ class Meetings:
         measured = {
             "contacts/length": self.length,
             "contacts/overlap": self.overlap,
+            "contacts/pushed": np.array([self.pushed_nodes, self.pushed_area]),
             "contacts/met": np.array([surface.has_met for surface in self.surfaces]),
         }
         return {"contacts/counts": counts, **measured} | self.voids.get_state()
@@ -519,6 +531,8 @@ class Meetings:
             pair.stretches = stretches
         self.length = float(state["contacts/length"])
         self.overlap = float(state.get("contacts/overlap", 0.0))
+        pushed_nodes, self.pushed_area = map(float, state.get("contacts/pushed", (0, 0.0)))
+        self.pushed_nodes = int(pushed_nodes)
 
     def _set_met(self, met: np.ndarray | None) -> None:
         """Which surfaces have lain on others, as of `get_state`; None: not known, so none."""

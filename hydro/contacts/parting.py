@@ -253,10 +253,14 @@ def push_apart(outlines, bodies):
 
 
 class Bodies:
-    """The outlines of all bodies, of surfaces in a fixed order; `bodies`: their numbers, by id."""
+    """The outlines of all bodies, of surfaces in a fixed order; `bodies`: their numbers, by id.
+
+    swept: the area in cells that faces have swept in the last `push_apart`.
+    """
 
     def __init__(self, surfaces: Sequence[Surface], bodies: Mapping[int, int]):
         self.surfaces = surfaces
+        self.swept = 0.0
         self._numbers = bodies
         firsts = np.cumsum([0, *(surface.count + 1 for surface in surfaces)])
         self.spans = [slice(a, b) for a, b in itertools.pairwise(firsts.tolist())]
@@ -331,6 +335,7 @@ class Bodies:
 
         longest_way [m]: no node goes further: a jump in a short step would crush its cells.
         """
+        self.swept = 0.0
         if self.numbers.size < 2:
             return 0
         outlines = self.outlines
@@ -345,6 +350,7 @@ class Bodies:
         lengths = np.hypot(*ways)
         ways *= np.where(lengths > longest_way, longest_way / np.maximum(lengths, 1e-300), 1.0)
         np.add(self.before, ways, out=outlines.nodes)
+        self.swept = self._measure_swept(ways)
         for surface, span in zip(self.surfaces, self.spans, strict=True):
             if not surface.rigid:
                 surface.new[...] = outlines.nodes[:, span]
@@ -352,6 +358,19 @@ class Bodies:
         for node, key_node in self.ends.items():
             key_node.shift(outlines.nodes[:, node] - self.before[:, node])
         return moved
+
+    def _measure_swept(self, ways: np.ndarray) -> float:
+        """Area that faces sweep on these ways (2, N), each in mean cells of its own block."""
+        cells = 0.0
+        for surface, span in zip(self.surfaces, self.spans, strict=True):
+            way = ways[:, span]
+            if not way.any():
+                continue
+            along = np.diff(self.before[:, span])
+            mean = 0.5 * (way[:, 1:] + way[:, :-1])
+            areas = np.abs(along[0] * mean[1] - along[1] * mean[0])
+            cells += float(areas.sum()) / surface.measure_cell()
+        return cells
 
 
 def _may_move(key_node: KeyNode) -> bool:

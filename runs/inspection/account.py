@@ -269,6 +269,10 @@ RULES = (
          "how many times dt fell below its largest value"),
     Rule("overlap", most("contact_overlap"), 0.1, "bodies overlap by {value:.2g} cells",
          "largest area by which bodies lay in each other after a step, in cells"),
+    Rule("pushed apart", most("contact_pushed_area"), 1.0,
+         "bodies were pushed apart by {value:.2g} cells",
+         "area without a flux by which nodes that lay deep in another body were pushed out of it, "
+         "in cells, since the start"),
     Rule("drift", lambda history, _: max(measure_drifts(history).values(), default=np.nan),
          CONSERVATION_ERROR_LIMIT, "conservation error {value:.1e}",
          "largest relative conservation error of mass, energy or momentum; round-off is below the "

@@ -8,6 +8,7 @@ from shockgrid.hydro.contacts.facets import looks_at
 from shockgrid.hydro.contacts.necks import THINNEST_CELL_PART, Necks
 from shockgrid.hydro.contacts.parting import DEEPEST_NODE_PART
 from shockgrid.hydro.motion.overlaps import is_inside
+from shockgrid.hydro.rows import RHO
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.regrid.errors import RunFailure
 from shockgrid.regrid.sides import trace_outline
@@ -162,10 +163,18 @@ def test_corners_that_overlap_are_parted(depth):
     simulation = Simulation(bodies, [], t_end=1.0)
     bodies[1].nodes[0] -= 0.3 + 0.1 * depth
     bodies[1].nodes[1] -= 0.1 * depth
+    first = simulation.start_row()
     rows = [simulation.advance() for _ in range(8)]
     overlaps = [row["contact_overlap"] for row in rows]
     assert max(overlaps) < depth**2
     assert overlaps[-1] < 3e-3
+    assert rows[-1]["contact_pushed_nodes"] > 0
+    assert rows[-1]["contact_pushed_area"] > 0.0
+    # only the nodes move: no mass, no energy
+    least_energy = 1e-15 * bodies[0].state[RHO].max() * bodies[0].rim.c.max() ** 2
+    for name in first:
+        if name.startswith(("total_mass", "total_energy")):
+            assert rows[-1][name] == pytest.approx(first[name], rel=1e-14, abs=least_energy)
 
 
 def test_bodies_deep_in_each_other_end_the_run():

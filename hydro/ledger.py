@@ -11,6 +11,8 @@ radian.  Radial momentum is not conserved and has no column.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from shockgrid.hydro.block import Block
@@ -52,12 +54,21 @@ def split_mass(masses: dict[str, float], names: tuple[str, str], mass: float, fi
 
 
 class Ledger:
-    """Running boundary integrals, and the totals of the blocks, by the label of their material."""
+    """Running boundary integrals, and the totals of the blocks, by the label of their material.
 
-    def __init__(self, blocks: list[Block]):
+    joined: labels of materials that are counted as one, and the label of that one.
+    """
+
+    def __init__(self, blocks: list[Block], joined: Mapping[str, str] | None = None):
         self.blocks = blocks
+        joined = joined or {}
+        self.labels = {
+            block.material: joined.get(block.material, block.material) for block in blocks
+        }
         labels = [
-            name for block in blocks for name in block.eos.material_names or (block.material,)
+            name
+            for block in blocks
+            for name in block.eos.material_names or (self.labels[block.material],)
         ]
         self.materials = list(dict.fromkeys(labels))
         self.mass_in = dict.fromkeys(self.materials, 0.0)
@@ -71,7 +82,7 @@ class Ledger:
             mass, momentum_x, momentum_y, energy = sum_fluxes(block.rim.rows, block.plan.counted)
             names = block.eos.material_names
             if names is None:
-                self.mass_in[block.material] -= dt * mass
+                self.mass_in[self.labels[block.material]] -= dt * mass
             else:
                 first = sum_first_flux(block)
                 split_mass(self.mass_in, names, -dt * mass, -dt * first)
@@ -98,7 +109,7 @@ class Ledger:
             total = block.totals.sums
             names = block.eos.material_names
             if names is None:
-                sums[block.material] += total.mass
+                sums[self.labels[block.material]] += total.mass
             else:
                 split_mass(sums, names, total.mass, total.first_mass)
             momentum_x += total.momentum_x

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -86,6 +86,7 @@ class Joining(Protocol):
 
     first_nodes: np.ndarray | None
     name: str
+    joined: Mapping[str, str]  # labels of materials that become one, and its label
 
     def is_due(self, t: float) -> bool:
         """Whether it is time [s] for it, and it has not been done yet."""
@@ -151,6 +152,7 @@ class Simulation:
         self.handover = handover
         self.refining = refining
         self._counts_cells = refining is not None
+        self._joined = {} if handover is None else handover.joined
         self._processors: int | None = None  # for the threads of this rank
         self._handed_over = ""  # why, in the row of the step in which it was
         self._connect(blocks, links, make_regridder)
@@ -161,7 +163,7 @@ class Simulation:
         if refining is not None:  # contacts stay as thick as they are on the first cells
             thickness = [contact.thickness for contact in self.motion.sides.thick_contacts]
             self._line_rule = replace(self._line_rule, thickness=max(thickness, default=None))
-        self.ledger = Ledger(blocks)
+        self.ledger = Ledger(blocks, self._joined)
         self.stopwatch = Stopwatch()
         self.last_reason: RunFailure | None = None  # why a step was rejected last
         self.finished: str | None = None
@@ -390,7 +392,7 @@ class Simulation:
         blocks, links, make_regridder = refining.rebuild(refining.make_first_nodes(count), states)
         self._connect(blocks, links, make_regridder)
         ledger = self.ledger
-        self.ledger = Ledger(blocks)
+        self.ledger = Ledger(blocks, self._joined)
         self.ledger.set_state(ledger.get_state())
         small = self.small_cells
         self.small_cells = SmallCells(self._shared, small.allowed, small.start)
@@ -429,7 +431,7 @@ class Simulation:
         self._line_rule = replace(self._line_rule, respacing=None)
         self._connect(blocks, links, make_regridder)
         ledger = self.ledger
-        self.ledger = Ledger(blocks)
+        self.ledger = Ledger(blocks, self._joined)
         self.ledger.set_state(ledger.get_state())
         self.small_cells = SmallCells(self._shared, self.small_cells.allowed, 0.0)
         self._make_flow()

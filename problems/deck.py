@@ -195,6 +195,13 @@ class VoidFill(DeckTable, kw_only=True):
     gamma: key(float, "of the gas", gt=1, le=10) = 1.4
 
 
+# keys of decks whose blocks may become one of two materials
+HandoverKey = key(
+    bool, "where the lines can no longer be followed, go on with both materials on one grid"
+)
+RefinementKey = key(int, "with handover: how much finer the grid of both materials is", ge=1, le=16)
+
+
 class Regrid(DeckTable, kw_only=True):
     """Which regridder rebuilds the blocks, and with what options."""
 

@@ -126,6 +126,23 @@ class Problem:
         simulation.clock.retry_dt = first_dt
         return simulation
 
+    def make_handover(self, blocks: Sequence, size: float) -> Any:
+        """What lays these blocks, which fill a rectangle, on one of two materials where they can
+        no longer be followed; None where the deck does not say so.
+
+        size: of the blocks' cells [m].
+        """
+        deck: Any = self.deck
+        if not deck.handover:
+            return None
+        from shockgrid.hydro.remap.box import make_box_handover  # with scipy: slow to load
+
+        return make_box_handover(
+            blocks,
+            size / deck.handover_refinement,
+            lambda: deck.regrid.make(threads=deck.run.threads),
+        )
+
     def list_boxes(self) -> list[BlockPlan]:
         """The blocks if they are rectangles of uniform cells, or may be planned as such."""
         return []

@@ -28,9 +28,26 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.links import join
 from shockgrid.hydro.motion.line import LineRule
 from shockgrid.hydro.motion.smoothing import THICK_CELLS
-from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Output, Regrid, RunControl, key
+from shockgrid.problems.deck import (
+    MOST_CELLS,
+    Deck,
+    HandoverKey,
+    Limiter,
+    Output,
+    RefinementKey,
+    Regrid,
+    RunControl,
+    key,
+)
 from shockgrid.problems.initial_states import make_plane_grid, mix_states, put_walls
-from shockgrid.problems.pictures import Colours, draw_field, draw_grid, find_dump, make_panels
+from shockgrid.problems.pictures import (
+    Colours,
+    draw_field,
+    draw_grid,
+    find_dump,
+    make_panels,
+    trace_contact,
+)
 from shockgrid.problems.problem import Problem
 from shockgrid.problems.references.hugoniot import shock_with_mach
 from shockgrid.problems.references.riemann import solve_riemann
@@ -142,6 +159,8 @@ class ShockBubbleDeck(Deck, kw_only=True):
         ge=0,
         le=1,
     ) = None
+    handover: HandoverKey = False
+    handover_refinement: RefinementKey = 2
     limiter: Limiter = "van-leer"
 
 
@@ -246,10 +265,12 @@ class ShockBubble(Problem):
         ]
         put_walls(*blocks.values())
         surface = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
+        size = CORE_PART * BUBBLE_RADIUS / deck.cells
         simulation = self.simulate(
             blocks.values(),
             links,
             line_rule=LineRule(thickness=self.choose_thickness(surface)),
+            handover=self.make_handover(list(blocks.values()), size),
         )
         west_seam, east_seam, west, east, _, top = (link.leader for link in links[:6])
         for side in (west, east):  # else the vortex takes these points into the fold of the jet
@@ -266,6 +287,8 @@ class ShockBubble(Problem):
         first falls to the mean of both sides (at the wall) or to 1.05 of that ahead (on the axis,
         where it is weakened by refraction), from the tube's beginning on.
         """
+        if len(evolution.blocks) == 1:
+            return self._measure_field(evolution.blocks[0])
         blocks = {block.name: block for block in evolution.blocks}
         lines = west, _, east = [blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
         axis = [(blocks[name].nodes[0, :, 0], blocks[name].p[:, 0]) for name in AXIS]
@@ -283,6 +306,30 @@ class ShockBubble(Problem):
             "volume": sum(float(blocks[name].volume.sum()) for name in BUBBLE),
             "axis_front": find_front(axis, 1.05 * AIR_PRESSURE),
             "wall_front": find_front(wall, 0.5 * (AIR_PRESSURE + self.shock.p)),
+        }
+
+    def _measure_field(self, block) -> dict[str, float]:
+        """The same, of a block of both gases: the bubble ends where it fills half of a cell.
+
+        No ends on the axis, nan, where the jet of air has come through.
+        """
+        x, y = np.concatenate(trace_contact(block), axis=1)
+        lowest_row = 0.5 * (block.nodes[1, 0, 0] + block.nodes[1, 0, 1])
+        on_axis = x[y <= lowest_row + 1e-9 * HALF_HEIGHT]
+        on_axis = on_axis if on_axis.size else np.array([math.nan])
+        bubble = block.volume * block.cell_fields["volume_fraction"]
+        nodes = block.nodes[0]
+        p = block.p
+        return {
+            "upwind": float(on_axis.min()),
+            "downwind": float(on_axis.max()),
+            "rear": float(x.min()),
+            "height": float(y.max()),
+            "volume": float(bubble.sum()),
+            "axis_front": find_front([(nodes[:, 0], p[:, 0])], 1.05 * AIR_PRESSURE),
+            "wall_front": find_front(
+                [(nodes[:, -1], p[:, -1])], 0.5 * (AIR_PRESSURE + self.shock.p)
+            ),
         }
 
     def find_focus(self, history) -> float:
@@ -452,7 +499,10 @@ def draw_shadowgraph(axis, gas: str, dump) -> None:
     for block in dump.blocks:
         x, y = 1e3 * block.nodes
         draw_grid(axis, np.array([x, -y]), color="C0" if block.material == gas else "0.6")
-    lines = [1e3 * blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
+    if len(blocks) == 1:
+        lines = [1e3 * curve for curve in trace_contact(dump.blocks[0])]
+    else:
+        lines = [1e3 * blocks[name].nodes[:, row] for name, row in OUTLINE.items()]
     for x, y in lines:
         axis.plot(x, y, "k", x, -y, "k", lw=1.0)
     ends = np.concatenate(lines, axis=1)[0]

@@ -1,6 +1,6 @@
-"""Two blocks of one material each laid on one block of two materials: what was a line is a field.
+"""Blocks of one material each laid on one block of two materials: what was a line is a field.
 
-The grid of the new block covers both old ones.  Each of its cells takes from both what lies in it:
+The grid of the new block covers all old ones.  Each of its cells takes from both what lies in it:
 mass, momentum and total energy of linear fields as in every remapping (theory F12), and the volume.
 So the mass of each material, momentum and energy stay the same to round-off, and the volume
 fraction is what the line had cut off.  Theory F19.6.
@@ -8,7 +8,7 @@ fraction is what the line had cut off.  Theory F19.6.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,20 +43,21 @@ def cut_block(block: Block, new_nodes: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def merge_states(
-    first: Block, second: Block, eos: Mixture, new_nodes: np.ndarray
+    first: Sequence[Block], second: Sequence[Block], eos: Mixture, new_nodes: np.ndarray
 ) -> dict[str, Any]:
-    """What cells of a block of two materials hold where these two blocks have been.
+    """What cells of a block of two materials hold where blocks of the first and the second lay.
 
     Returns rho, u, v, p, and both fractions, (mi, mj) each.  Raises BadInput where the new grid
-    (2, mi+1, mj+1) does not cover the same as both blocks together.
+    (2, mi+1, mj+1) does not cover the same as all blocks together.
     """
-    content, volume, left = cut_block(first, new_nodes)
-    content_second, volume_second, left_second = cut_block(second, new_nodes)
-    volumes, _ = compute_cell_moments(new_nodes, first.geometry.curved)
+    content, volume, left = cut_blocks(first, new_nodes)
+    content_second, volume_second, left_second = cut_blocks(second, new_nodes)
+    volumes, _ = compute_cell_moments(new_nodes, first[0].geometry.curved)
     short = float(np.abs(volumes - volume - volume_second).sum())
     if max(left + left_second, short) > MOST_LEFT_PART * volumes.sum():
+        names = ", ".join(repr(block.name) for block in (*first, *second))
         raise BadInput(
-            f"blocks {first.name!r} and {second.name!r}: the grid for both together does not cover "
+            f"blocks {names}: the grid for all together does not cover "
             f"what they cover: {(left + left_second) / volumes.sum():.2g} of their volume is left, "
             f"{short / volumes.sum():.2g} is missing"
         )
@@ -78,12 +79,27 @@ def merge_states(
     }
 
 
+def cut_blocks(
+    blocks: Sequence[Block], new_nodes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """What `cut_block` finds of several blocks, added up in their order."""
+    content, volume, left = cut_block(blocks[0], new_nodes)
+    for block in blocks[1:]:
+        more_content, more_volume, more_left = cut_block(block, new_nodes)
+        content = content + more_content
+        volume = volume + more_volume
+        left += more_left
+    return content, volume, left
+
+
 class Handover:
-    """When the two blocks of a simulation become one of two materials, and how.
+    """When the blocks of a simulation become one of two materials, and how.
 
     time: from which on [s], None: when the flow cannot go on otherwise; eos: of both materials;
-    make_nodes: gives the grid (2, ni+1, nj+1) for both blocks; assemble: makes the new block with
-    its sides and what makes its regridder; name: of the block.
+    make_nodes: gives the grid (2, ni+1, nj+1) for all blocks; assemble: makes the new block with
+    its sides and what makes its regridder; name: of the block; joined: labels of materials that
+    become one, and its label.  Blocks of the first material are
+    those with the material of the first block, or with its equation of state where the two differ.
     """
 
     def __init__(
@@ -93,12 +109,14 @@ class Handover:
         make_nodes: Callable[[Sequence[Block]], np.ndarray],
         assemble: Assemble,
         name: str,
+        joined: Mapping[str, str] | None = None,
     ):
         self.time = time
         self.eos = eos
         self.make_nodes = make_nodes
         self.assemble = assemble
         self.name = name
+        self.joined = joined or {}
         self.first_nodes: np.ndarray | None = None  # of the new block, when it is there
 
     def is_due(self, t: float) -> bool:
@@ -108,9 +126,16 @@ class Handover:
     def merge(self, blocks: Sequence[Block]) -> tuple[list[Block], list, Callable[[], object]]:
         """The new block with the states of both, its links, and what makes its regridder."""
         nodes = self.make_nodes(blocks)
-        first, second = blocks
+        first = [block for block in blocks if self._is_first(block, blocks[0])]
+        second = [block for block in blocks if not self._is_first(block, blocks[0])]
         held = merge_states(first, second, self.eos, nodes)
         return self._assemble(nodes, held)
+
+    def _is_first(self, block: Block, leading: Block) -> bool:
+        """Whether a block is of the first material, as the leading one is."""
+        if self.eos.first == self.eos.second:
+            return block.material == leading.material
+        return block.eos == self.eos.first
 
     def lay(self, state: Any) -> tuple[list[Block], list, Callable[[], object]] | None:
         """The new block of a restart point, whose state is not in it yet; None: both are apart."""

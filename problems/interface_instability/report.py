@@ -7,6 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from shockgrid.problems.interface_instability.line import Harmonic
+from shockgrid.problems.interface_instability.reshock import (
+    TURBULENT_GROWTH,
+    compare_growth,
+    describe_reshock,
+    find_reshock,
+    scale_since,
+)
 from shockgrid.problems.interface_instability.theories import (
     LEAST_WINDOW,
     MOST_COUPLED_KA,
@@ -340,6 +347,9 @@ class Results:
         if deck.second_shock is None:
             rows, notes = _compare(self, column, kct)
         notes += _describe_ends(self)
+        if reshock := find_reshock(self):
+            rows += compare_growth(self, reshock, column)
+            notes.append(describe_reshock(reshock))
         notes += _describe_handover(self, run.history)
         far = column["far_transverse_speed"].max() / theory.sound_speed
         notes.append(
@@ -353,8 +363,12 @@ class Results:
 
     def figures(self):
         found = super().figures()
-        many = len(self.harmonics) > MOST_CURVES
-        return {name: draw for name, draw in found.items() if name != "spectrum" or many}
+        drawn = {"spectrum": len(self.harmonics) > MOST_CURVES, "reshock": self._is_reshocked()}
+        return {name: draw for name, draw in found.items() if drawn.get(name, True)}
+
+    def _is_reshocked(self) -> bool:
+        """Whether the run is to show what the shock does that comes back from an end wall."""
+        return find_reshock(self) is not None
 
     def draw_growth(self, figure, run) -> None:
         """Amplitude and growth rate against theory, and the interface with its grid at the end."""
@@ -417,6 +431,32 @@ class Results:
             axes.set_xlim(*window)
         label = name_axis("density", "kg/m3" if self.t_unit == "s" else "1")
         figure.colorbar(picture, ax=panels, label=label)
+
+    def draw_reshock(self, figure, run) -> None:
+        """Widths of the zone after the reshock beside the growth of a turbulent zone."""
+        reshock = find_reshock(self)
+        history = run.history
+        wavelength = self.deck.wavelength
+        since = scale_since(reshock, wavelength, history["t"])
+        figure.set_size_inches(7.0, 4.5)
+        axes = figure.subplots()
+        extent = np.asarray(history["interface_max"]) - np.asarray(history["interface_min"])
+        axes.plot(since, extent / wavelength, label="between both tips")
+        if "integral_width" in history:
+            width = np.asarray(history["integral_width"]) / wavelength
+            axes.plot(since, width, label="integral width")
+        # from the least extent on
+        after = since > 0.0
+        start = int(np.flatnonzero(after)[np.argmin(extent[after])])
+        way = since[start:] - since[start]
+        model = extent[start] / wavelength + TURBULENT_GROWTH * way
+        axes.plot(since[start:], model, "k--", label=f"{TURBULENT_GROWTH} A dV: turbulent zone")
+        axes.axvline(0.0, color="0.4", lw=0.8, ls="-.", label="reshock")
+        mixed = np.flatnonzero(np.asarray(history.get("mixed_mass", ())) > 0.0)
+        if mixed.size and mixed[0] > 0:
+            axes.axvline(since[mixed[0]], color="C3", lw=0.8, label="one grid for both")
+        words = "A dV (t - arrival of the reshock) / wavelength"
+        axes.set(xlabel=words, ylabel="width / wavelength")
 
     def draw_spectrum(self, figure, run) -> None:
         """k a of each mode by its number at some times, and the line at these times.

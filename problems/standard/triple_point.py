@@ -21,7 +21,16 @@ from shockgrid.hydro.block import Block
 from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.links import join
 from shockgrid.hydro.motion.line import LineRule
-from shockgrid.problems.deck import MOST_CELLS, Deck, Limiter, Regrid, RunControl, key
+from shockgrid.problems.deck import (
+    MOST_CELLS,
+    Deck,
+    HandoverKey,
+    Limiter,
+    RefinementKey,
+    Regrid,
+    RunControl,
+    key,
+)
 from shockgrid.problems.initial_states import put_walls
 from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.riemann import solve_riemann
@@ -43,6 +52,8 @@ class TriplePointDeck(Deck, kw_only=True):
     cells: key(int, "cells in a length of 1, an even number", ge=4, le=MOST_CELLS) = 10
     thickness: key(float | None, "smoothing length. If left out: 0.75 of a cell", ge=0, le=1) = None
     relax: key(float, "fraction of the way to even node spacing in a step", ge=0, le=1) = 0.05
+    handover: HandoverKey = False
+    handover_refinement: RefinementKey = 2
     limiter: Limiter = "van-leer"
 
 
@@ -80,10 +91,16 @@ class TriplePoint(Problem):
         links = [join("interface", *pair) for pair in pairs]
         put_walls(*blocks)
         rule = LineRule(relax=deck.relax, thickness=deck.thickness)
-        return self.simulate(blocks, links, line_rule=rule)
+        handover = self.make_handover(blocks, 1.0 / deck.cells)
+        return self.simulate(blocks, links, line_rule=rule, handover=handover)
 
     def measure(self, evolution) -> dict[str, float]:
-        """Where the point is; early on, star states beside the contacts at the walls."""
+        """Where the point is; early on, star states beside the contacts at the walls.
+
+        All nan where the gases are on one grid.
+        """
+        if len(evolution.blocks) == 1:
+            return dict.fromkeys(("point_x", "point_y", *self.list_stars()), math.nan)
         left, bottom, top = evolution.blocks
         row = {"point_x": float(top.nodes[0, 0, 0]), "point_y": float(top.nodes[1, 0, 0])}
         for name, block, j in (("bottom", bottom, 0), ("top", top, -1)):
@@ -99,15 +116,19 @@ class TriplePoint(Problem):
                     row[f"{q}_{name}_{side}"] = float(mean) if known else math.nan
         return row
 
-    def report(self, run) -> Report:
-        history = run.history
-        # exact states beside the left contact at the walls, by columns
+    def list_stars(self) -> dict[str, float]:
+        """Exact states beside the left contact at the walls, by columns."""
         stars = {}
-        rows = []
         for name, exact in self.exact.items():
             for side, rho in (("l", exact.rho_left), ("r", exact.rho_right)):
                 values = {"rho": rho, "u": exact.u, "p": exact.p}
                 stars |= {f"{q}_{name}_{side}": float(value) for q, value in values.items()}
+        return stars
+
+    def report(self, run) -> Report:
+        history = run.history
+        rows = []
+        stars = self.list_stars()
         known = np.isfinite([history[name] for name in stars]).all(axis=0)
         last = int(np.flatnonzero(known)[-1]) if np.any(known) else None
         for name, theory in stars.items():
@@ -116,12 +137,14 @@ class TriplePoint(Problem):
             found = math.nan if last is None else float(history[name][last])
             rows.append(Row(name, found, theory, label, digits=5))
         off = [abs(row.difference) for row in rows if row.name[0] in "pu"]
-        masses = [history[f"total_mass_{name}"] for name in GASES]
+        masses = [values for name, values in history.items() if name.startswith("total_mass_")]
         lost = max(float(np.ptp(mass) / mass[0]) for mass in masses)
         rows += [Row("star", max(off), error="star"), Row("mass", lost, error="mass")]
         head = f"triple-point, {self.deck.cells} cells in a length of 1"
         if last is not None:
             head += f"; states beside the left contact at the walls, t = {history['t'][last]:.3f}"
-        x, y = run.last("point_x"), run.last("point_y")
-        where = f"t = {run.last('t'):.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
+        followed = np.flatnonzero(np.isfinite(history["point_x"]))[-1]
+        x, y = history["point_x"][followed], history["point_y"][followed]
+        t = history["t"][followed]
+        where = f"t = {t:.3g}: the point is at x = {x:.4f}, y = {y:.4f}"
         return Report(head, rows, [where])

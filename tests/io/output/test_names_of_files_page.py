@@ -46,8 +46,9 @@ def test_columns_of_the_history_are_those_of_the_page(folders):
     with open(folders / "flow" / "history.csv", encoding="utf-8") as file:
         columns = next(csv.reader(file))
     assert len(told) > 25
-    # where lines slide, where they have tension, where lines come and go, where bodies meet
-    elsewhere = {"pulled_pieces", "surface_energy", "cells"}
+    # where lines slide, where they have tension, where lines come and go, where blocks become one,
+    # where bodies meet
+    elsewhere = {"pulled_pieces", "surface_energy", "cells", "handover"}
     elsewhere |= {"contacts_made", "contacts_opened", "contact_length", "contact_overlap"}
     elsewhere |= {"contact_pushed_nodes", "contact_pushed_area"}
     strange = {one for one in told if not any(fnmatch(name, one) for name in columns)}

@@ -11,7 +11,8 @@ A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end gener
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
     output NAME                 the command and its output: a run's summary, a study's orders
-    bench [FILE: ]TABLE         a table of results/bench.json, or of another file there
+    bench [FILE: ]TABLE [| COLUMN=VALUE]   a table of results/bench.json, or of another file there,
+                                or those of its rows
     result NAME                 docs/results/NAME.txt, which a benchmark or a trial has written
     causes ends                 why runs end early, of `runs.early_end.causes`
     rules verdict               when the verdict of a run has a reservation
@@ -254,13 +255,18 @@ def fill_output(arguments: str) -> list[str]:
 
 
 def fill_bench(arguments: str) -> list[str]:
-    """A table of the benchmarks, with the command and the machine."""
-    file, _, table = arguments.strip().rpartition(": ")
+    """A table of the benchmarks, with the command and the machine; with a condition its rows."""
+    name, _, condition = arguments.strip().partition(" | ")
+    file, _, table = name.rpartition(": ")
     found = read_result(file or "bench")[table]
     rows = found["rows"]
-    table = make_table(rows[0], [[str(value) for value in row.values()] for row in rows])
-    machine = f", {found['machine']}" if "machine" in found else ""
-    return [f"`{found['command']}`{machine}.", "", *table]
+    said = f"`{found['command']}`"
+    if condition:
+        column, _, value = condition.partition("=")
+        rows = [row for row in rows if str(row[column]) == value]
+    elif "machine" in found:
+        said += f", {found['machine']}"
+    return [f"{said}.", "", *make_table(rows[0], [map(str, row.values()) for row in rows])]
 
 
 def fill_result(name: str) -> list[str]:

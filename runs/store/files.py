@@ -40,8 +40,8 @@ SYSTEM = ("dev", "proc", "sys")  # folders at the root that hold no files of peo
 DUMPS = "dumps"  # folder of a run
 LOCK = ".lock"
 KEPT_NAMES = (  # files of a run but those in `dumps`; deck.toml, by which it is known, last
-    "history.csv", "gauges.csv", "run.xmf", "summary.txt", "run.log", "problem.py", "verdict.json",
-    "early-end.png", "early-end.txt", "problem.json", "deck.toml",
+    "history.csv", "gauges.csv", "history.sums", "gauges.sums", "run.xmf", "summary.txt", "run.log",
+    "problem.py", "verdict.json", "early-end.png", "early-end.txt", "problem.json", "deck.toml",
 )  # fmt: skip
 OWN_NAMES = (*KEPT_NAMES, LOCK)
 

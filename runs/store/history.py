@@ -7,9 +7,9 @@ The first row is step 0, where only some columns have a value; an empty field re
 in a column of words).  A last line without its end is an incomplete write; reading drops it.
 Numbers are written with the digits that they need to read back to the same bits.
 
-The last column, `crc32`, is the CRC-32 of the file's first line, the step of the row before and
-the row's text: so a row that was changed is seen, and so is one that lacks the row before it.  What
-follows the first such row is not trusted: a restart cuts the file there and computes it again.
+Before each dump a line goes into `history.sums` beside it: the step of the last row, and the CRC-32
+of the whole file so far.  So a change of the rows up to a dump is seen, and rows that are missing;
+what follows the last sum that fits is not trusted, and a restart computes it again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ from shockgrid.runs.store.directory import RunDirectory
 from shockgrid.runs.store.dumps import has_state, open_dump, read_state
 from shockgrid.runs.store.files import disk_errors, write_atomically
 
-SUM = "crc32"
 STEP_TIME = "seconds_step"  # a column that the runner adds
 FLUSH_EVERY = 0.1  # wall seconds between two flushes
 PLAIN = {int, float, str}  # types, exactly, that are encoded as they are
@@ -43,7 +42,7 @@ encode = msgspec.json.Encoder().encode
 class Rows:
     """What a history file holds.
 
-    columns: names without that of the sums, None where the first line is lost or there is no file;
+    columns: names, None where the first line is lost or there is no file;
     rows: step and line, up to what is damaged; fault: what that is, "" for nothing.
     """
 
@@ -78,39 +77,78 @@ def read_rows(path: Path, newest: int = 0) -> Rows:
     newest: step of the last dump, up to which there have to be rows.
     """
     found = Rows(path)
+    sums = read_sums(path)  # first: of a live run the rows are ahead of them
     with disk_errors(path):
         lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else []  # the last is torn
+    if lines and lines[0].endswith(b",crc32"):  # of earlier versions: a sum in each row
+        lines = [line.rpartition(b",")[0] for line in lines]
     if lines:
         names = lines[0].decode("utf-8", "replace").split(",")
-        if "step" not in names or names[-1] != SUM:
+        if "step" not in names:
             found.fault = "is damaged in its first line, that of the names"
             return found
-        found.columns = names[:-1]
-        start = zlib.crc32(lines[0])
-        where = names.index("step")
-    for number, line in enumerate(lines[1:], start=2):
-        text, _, digits = line.rpartition(b",")
-        try:
-            good = int(digits) == _sum(start, found.last, text)
-            found.rows += [(int(text.split(b",")[where]), line.decode("utf-8", "replace"))] * good
-        except (ValueError, IndexError):
-            good = False
-        if not good:
-            after = f"step {found.last}" if found.rows else "its names"
-            found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
-            return found
-    if newest and found.last < newest:
+        found.columns = names
+        _take_rows(found, lines[1:])
+    if newest and found.last < newest and not found.fault:
         there = (
             f"ends at step {found.last}" if found.rows else "is empty" if lines else "is missing"
         )
         found.fault = f"{there}, the dumps go to step {newest}"
+    if lines:
+        _check_sums(found, lines, sums)
     return found
 
 
-def _sum(start: int, after: int, text: bytes) -> int:
-    """The checksum of a row behind that of step `after`, -1 for none."""
-    before = b"" if after < 0 else str(after).encode("ascii")
-    return zlib.crc32(before + b":" + text, start)
+def _take_rows(found: Rows, lines: Sequence[bytes]) -> None:
+    """Read the rows up to the first that has other fields than there are columns, or a step that
+    is not behind the one before."""
+    columns = found.columns or []
+    place = columns.index("step")
+    for number, line in enumerate(lines, start=2):
+        fields = line.decode("utf-8", "replace").split(",")
+        try:
+            step = int(fields[place])
+        except (ValueError, IndexError):
+            step = -1
+        if len(fields) != len(columns) or step <= found.last:
+            after = f"step {found.last}" if found.rows else "its names"
+            found.fault = f"is damaged, or lacks rows, from line {number} on (after {after})"
+            return
+        found.rows.append((step, ",".join(fields)))
+
+
+def get_sums_path(path: Path) -> Path:
+    """The file of the sums of a history or a table of gauges."""
+    return path.with_suffix(".sums")
+
+
+def read_sums(path: Path) -> dict[int, int]:
+    """CRC-32 of a history up to each step at which a dump was written; {} where none are known."""
+    sums = {}
+    with contextlib.suppress(OSError):
+        for line in get_sums_path(path).read_text("utf-8", "replace").split("\n")[:-1]:
+            with contextlib.suppress(ValueError):
+                step, crc = line.split(",")
+                sums[int(step)] = int(crc, 16)
+    return sums
+
+
+def _check_sums(found: Rows, lines: Sequence[bytes], sums: Mapping[int, int]) -> None:
+    """Keep the rows up to the last sum that fits, where a later one does not."""
+    crc = zlib.crc32(lines[0] + b"\n")
+    good = -1
+    checked = 0
+    for (step, _), line in zip(found.rows, lines[1:], strict=False):
+        crc = zlib.crc32(line + b"\n", crc)
+        if step in sums:
+            if sums[step] != crc:
+                break
+            good = step
+            checked += 1
+    if checked < len(sums):
+        after = f"step {good}" if good >= 0 else "its names"
+        found.fault = found.fault or f"is damaged, or lacks rows, after {after}"
+        found.rows = [row for row in found.rows if row[0] <= good]
 
 
 class HistoryWriter:
@@ -121,8 +159,8 @@ class HistoryWriter:
         self.columns = columns
         self._names = set(columns or ())
         self._waiting: list[dict[str, Any]] = []
-        self._start = 0  # checksum of the first line, that of the names
-        self._last = -1 if columns is None else read_rows(path).last  # step of the last row
+        self._crc = zlib.crc32(path.read_bytes()) if columns is not None else 0  # of the whole file
+        self._last = -1  # step of the last row that was added
         self._flush_at = 0.0  # on the monotonic clock
         with disk_errors(path):
             self._file = open(path, "a", encoding="utf-8", newline="")
@@ -142,25 +180,30 @@ class HistoryWriter:
             self._names = set(self.columns)
             rows = [*self._waiting, row]
             self._waiting = []
-            lines = [",".join([*self.columns, SUM])]
+            lines = [",".join(self.columns)]
         elif row.keys() != self._names:
             raise BadInput(f"{self.path}: {describe_change(self.columns, row)}")
-        self._start = self._start or zlib.crc32(",".join([*self.columns, SUM]).encode("utf-8"))
         for one in rows:
-            text = format_row([one.get(name, "") for name in self.columns])
-            lines.append(f"{text.decode()},{_sum(self._start, self._last, text)}")
+            lines.append(format_row([one.get(name, "") for name in self.columns]).decode())
             self._last = int(one["step"])
+        text = "\n".join(lines) + "\n"
+        self._crc = zlib.crc32(text.encode("utf-8"), self._crc)
         with disk_errors(self.path):
-            self._file.write("\n".join(lines) + "\n")
+            self._file.write(text)
             if now >= self._flush_at:
                 self._file.flush()
                 self._flush_at = now + FLUSH_EVERY
 
     def sync(self) -> None:
-        """Force the rows to the disk: called before a dump, which must not outlive its rows."""
+        """Force the rows to the disk, and note their sum: called before a dump, which must not
+        outlive its rows."""
         with disk_errors(self.path):
             self._file.flush()
             os.fsync(self._file.fileno())
+        if self._last >= 0:
+            sums = get_sums_path(self.path)
+            with disk_errors(sums), open(sums, "a", encoding="utf-8", newline="") as file:
+                file.write(f"{self._last},{self._crc:08x}\n")
 
     def close(self) -> None:
         """Close the file; more rows cannot follow."""
@@ -210,11 +253,11 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_columns(found: Rows) -> dict[str, np.ndarray]:
-    """The columns of those rows of a history that are whole, without their checksums."""
+    """The columns of those rows of a history that are whole."""
     if found.columns is None:
         return {}
     columns = zip(*(line.split(",") for _, line in found.rows), strict=True)
-    named = zip(found.columns, columns if found.rows else [()] * len(found.columns), strict=False)
+    named = zip(found.columns, columns if found.rows else [()] * len(found.columns), strict=True)
     return {name: _to_array(column) for name, column in named}
 
 
@@ -252,7 +295,9 @@ def truncate_history(path: Path, step: int, found: Rows) -> list[str] | None:
 
     Raises BadInput where rows up to `step` are lost.
     """
+    sums = get_sums_path(path)
     if found.columns is None or (step == 0 and not found.rows):
+        sums.unlink(missing_ok=True)
         path.unlink(missing_ok=True)
         return None
     if found.last < step:
@@ -262,7 +307,10 @@ def truncate_history(path: Path, step: int, found: Rows) -> list[str] | None:
             "choose an earlier one with --at"
         )
     kept = [line for number, line in found.rows if number <= step]
-    write_atomically(path, "\n".join([",".join([*found.columns, SUM]), *kept, ""]))
+    # the sums first: rows without a sum are read, sums without their rows are a fault
+    known = [f"{number},{crc:08x}" for number, crc in read_sums(path).items() if number <= step]
+    write_atomically(sums, "\n".join([*known, ""]))
+    write_atomically(path, "\n".join([",".join(found.columns), *kept, ""]))
     return found.columns
 
 

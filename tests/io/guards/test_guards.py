@@ -119,6 +119,7 @@ def test_an_edited_deck_is_told_with_its_keys(shockgrid, dump, key):
 
 
 HISTORY = Path("run/history.csv")
+SUMS = Path("run/history.sums")
 
 
 @pytest.fixture
@@ -143,11 +144,14 @@ def drop(first, last):
 
 DAMAGES = {
     "deleted": (HISTORY.unlink, "history.csv is missing, the dumps go to step 30"),
-    "cut out": (lambda: drop(3, 9), "from line 4 on (after step 1)"),
-    "without its start": (lambda: drop(1, 4), "from line 2 on (after its names)"),
+    "cut out": (lambda: drop(3, 9), "is damaged, or lacks rows, after its names"),
+    "without its start": (lambda: drop(1, 4), "is damaged, or lacks rows, after its names"),
     "cut off": (lambda: drop(20, 32), "history.csv ends at step 18, the dumps go to step 30"),
-    "edited": (lambda: change(7, lambda line: line.replace(",", ",1", 1)), "from line 8 on"),
-    "sum edited": (lambda: change(7, lambda line: line[:-1] + "x"), "is damaged, or lacks rows"),
+    "edited": (
+        lambda: change(7, lambda line: line.replace(",", ",1", 1)),
+        "lacks rows, after step",
+    ),
+    "sums edited": (lambda: SUMS.write_text("4,0123abcd\n"), "is damaged, or lacks rows"),
     "other names": (lambda: change(0, str.upper), "history.csv is damaged in its first line"),
     "garbage": (lambda: HISTORY.write_bytes(bytes(range(256)) * 9), "history.csv is damaged in"),
     "twice": (lambda: change(5, lambda line: f"{line}\n{line}"), "from line 7 on (after step 4)"),
@@ -183,6 +187,6 @@ def test_a_history_without_a_point_before_its_damage_is_refused(shockgrid, whole
             path.unlink()
     drop(20, 22)
     code, _, error = shockgrid("restart", "run", "-q", "--set", "run.max_steps=34")
-    assert code == 2 and "no restart point is earlier" in error and "line 21" in error
+    assert code == 2 and "no restart point is earlier" in error and "after step 17" in error
     code, _, error = shockgrid("restart", "run", "-q", "--at", "30")
     assert code == 2 and "choose an earlier restart point with --at" in error

@@ -21,8 +21,11 @@ def compute_rate(cut):
     return np.sqrt(1.0 + cut**6) - cut**3
 
 
-def make_streams(cells, cut, k_a=1e-3):
-    """Two streams of one gas, periodic along their contact, in the growing wave of theory."""
+def make_streams(cells, cut, k_a=1e-3, slides=False):
+    """Two streams of one gas, periodic along their contact, in the growing wave of theory.
+
+    The contact is an interface, or one of two lines if it `slides`.
+    """
     y = np.linspace(0.0, 1.0, cells + 1)
     away = np.linspace(0.0, 1.0, cells + 1)
     amplitude = k_a / K
@@ -46,7 +49,8 @@ def make_streams(cells, cut, k_a=1e-3):
             Block(name, IdealGas(1.4), nodes, 1.0, across, along, 1.0 / 1.4, material=name)
         )
     left, right = blocks
-    links = [join("interface", (left, "i_max"), (right, "i_min"))]
+    ends = (left, "i_max"), (right, "i_min")
+    links = [slide(*ends) if slides else join("interface", *ends)]
     links += [join("periodic", (block, "j_min"), (block, "j_max")) for block in blocks]
     put(left, "i_min", "wall")
     put(right, "i_max", "wall")
@@ -55,9 +59,9 @@ def make_streams(cells, cut, k_a=1e-3):
     )
 
 
-def measure_rate(cells, cut):
+def measure_rate(cells, cut, slides=False):
     """Growth of the line's first mode over k slip / 2, in the last .6 of the time."""
-    simulation = make_streams(cells, cut)
+    simulation = make_streams(cells, cut, slides=slides)
     rows = []
     while not simulation.finished:
         simulation.advance()
@@ -75,6 +79,16 @@ def test_growth_is_theorys_below_and_beyond_the_cut_off_whatever_the_cells(cut):
     errors = [abs(measure_rate(cells, cut) - compute_rate(cut)) for cells in (16, 32)]
     assert errors[1] < 0.03
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_sliding_contact_grows_as_fast_as_an_interface():
+    """Measured: 2.4 and 2.6 % too slow; 1.3 % both with 48 cells."""
+    cells = 24
+    cut = 0.75 * K / cells
+    linked = measure_rate(cells, cut) / compute_rate(cut)
+    sliding = measure_rate(cells, 0.0, slides=True)
+    assert sliding == pytest.approx(linked, abs=0.005)
+    assert sliding > 0.96
 
 
 def test_masses_and_energy_stay_though_material_flows_along_the_line():

@@ -12,7 +12,7 @@ import numpy as np
 from result_tables import Tables
 
 from shockgrid.hydro.convection import columns
-from shockgrid.hydro.convection.columns import FAMILIES
+from shockgrid.hydro.convection.fronts import FAMILIES
 from shockgrid.hydro.convection.tensor_grids import KINDS, compute_grid_reynolds, make_axis
 from shockgrid.problems.convection.convection_1d import Convection1D, measure_errors
 from shockgrid.problems.convection.moving_grid_1d import WORDS

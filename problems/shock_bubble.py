@@ -277,7 +277,7 @@ class ShockBubble(Problem):
             simulation.motion.sides.let_slide(side, top)
         # left to the gas, the middle square would be run over by the jet
         for seam in (west_seam, east_seam):
-            simulation.motion.sides.carry(seam, west, east)
+            simulation.motion.sides.tie_seam(seam, west, east)
         return simulation
 
     def measure(self, evolution) -> dict[str, float]:

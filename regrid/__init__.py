@@ -7,7 +7,8 @@ The files of the folder itself define the interfaces: errors, decorators of kern
 sides, entry points of other packages, whole marches, and the registry of regridders.
 Each subpackage imports only those to its left:
 
-    compilation <- errors, jit, protocol, sides <- curves, measure <- algebraic
+    compilation <- errors, jit, protocol, sides <- curves, spacings, measure
+    <- algebraic
     <- barrier, domains, node_speeds <- equidistribution, given, marching <- variational <- registry
 """
 
@@ -21,11 +22,7 @@ if TYPE_CHECKING:
     from shockgrid.regrid.algebraic import transfinite_grid as transfinite_grid
     from shockgrid.regrid.barrier.regridder import BarrierRegridder as BarrierRegridder
     from shockgrid.regrid.barrier.repair import repair_grid as repair_grid
-    from shockgrid.regrid.curves import arc_spacing as arc_spacing
-    from shockgrid.regrid.curves import clustered_spacing as clustered_spacing
-    from shockgrid.regrid.curves import geometric_spacing as geometric_spacing
     from shockgrid.regrid.curves import redistribute as redistribute
-    from shockgrid.regrid.curves import uniform_spacing as uniform_spacing
     from shockgrid.regrid.domains import make_domain as make_domain
     from shockgrid.regrid.equidistribution.volumes import (
         EquidistributionRegridder3D as EquidistributionRegridder3D,
@@ -47,13 +44,16 @@ if TYPE_CHECKING:
     from shockgrid.regrid.protocol import RegridReport as RegridReport
     from shockgrid.regrid.protocol import RegridResult as RegridResult
     from shockgrid.regrid.registry import make_regridder as make_regridder
+    from shockgrid.regrid.spacings import arc_spacing as arc_spacing
+    from shockgrid.regrid.spacings import clustered_spacing as clustered_spacing
+    from shockgrid.regrid.spacings import geometric_spacing as geometric_spacing
+    from shockgrid.regrid.spacings import uniform_spacing as uniform_spacing
 
 NAMES = {
     "shockgrid.regrid.algebraic": "AlgebraicRegridder transfinite_grid",
     "shockgrid.regrid.barrier.regridder": "BarrierRegridder",
     "shockgrid.regrid.barrier.repair": "repair_grid",
-    "shockgrid.regrid.curves": "arc_spacing clustered_spacing geometric_spacing "
-    "redistribute uniform_spacing",
+    "shockgrid.regrid.curves": "redistribute",
     "shockgrid.regrid.domains": "make_domain",
     "shockgrid.regrid.equidistribution.volumes": "EquidistributionRegridder3D",
     "shockgrid.regrid.errors": "BadInput RegridFailure",
@@ -64,6 +64,7 @@ NAMES = {
     "measure_first_line_gap measure_quality",
     "shockgrid.regrid.protocol": "RegridReport RegridResult Regridder",
     "shockgrid.regrid.registry": "make_regridder",
+    "shockgrid.regrid.spacings": "arc_spacing clustered_spacing geometric_spacing uniform_spacing",
 }
 MODULES = {name: module for module, names in NAMES.items() for name in names.split()}
 __all__ = sorted(MODULES)

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shockgrid.regrid.algebraic import transfinite_grid
-from shockgrid.regrid.curves import arc_spacing, clustered_spacing
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.sides import SIDE_NAMES, copy_sides
+from shockgrid.regrid.spacings import arc_spacing, clustered_spacing
 
 MOTION_SAMPLES = 129  # amplitudes at which the motion of a side is measured,
 SIDES_SAMPLES = 257  # and that of all sides, which may turn corners

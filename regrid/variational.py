@@ -309,6 +309,8 @@ FORCING_RESIDUAL = 0.05  # each linear solve goes on to this part of its first r
 MOST_SOLVES = 40  # its iterations
 MOST_STEP_HALVINGS = 16
 ROUND_OFF_FUNCTIONAL = 1e-13  # of the functional: the last steps change it by less
+SLOW_STEP_RATIO = 0.9  # of a step to the one before, from which steps are damped more
+LEAST_DAMPING = 0.1  # factor of a step
 
 
 class VariationalRegridder(WeightedRegridder):
@@ -428,8 +430,8 @@ class VariationalRegridder(WeightedRegridder):
             if step <= self.tolerance:
                 functional.descend(self.fraction)
                 break
-            if not self.weight.is_frozen and step > 0.9 * last:
-                damping = max(0.5 * damping, 0.1)  # the weight moves with the grid
+            if not self.weight.is_frozen and step > SLOW_STEP_RATIO * last:
+                damping = max(0.5 * damping, LEAST_DAMPING)  # the weight moves with the grid
             if not functional.descend(damping * self.fraction):
                 break
         return iterations, step, functional.limited

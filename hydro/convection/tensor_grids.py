@@ -37,8 +37,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from shockgrid.regrid.curves import correct_polevikov, solve_ed1, solve_polevikov
 from shockgrid.regrid.errors import BadInput, suggest
+from shockgrid.regrid.spacings import correct_polevikov, solve_ed1, solve_polevikov
 
 KINDS = ("uniform", "clustered", "polevikov", "monitor", "combined")
 WALLS = ("both", "low", "high")

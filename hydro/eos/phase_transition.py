@@ -48,17 +48,22 @@ P_COMPLETE = 12
 def second_hugoniot(eta, parameters):
     """Pressure of the second phase behind a shock from the first at rest, and its slope in eta."""
     ratio = parameters[SECOND_RHO0] / parameters[PARAMETER_RHO0]
-    denominator = 1.0 - ratio * (1.0 - eta)
-    narrowing = 1.0 / (1.0 - parameters[S_SECOND] * denominator)
+    compression = 1.0 - ratio * (1.0 - eta)  # 1 - rho0/rho with the density of the second phase
+    # its own Hugoniot, and the slope of that in the compression
+    narrowing = 1.0 / (1.0 - parameters[S_SECOND] * compression)
     modulus = parameters[SECOND_RHO0] * parameters[C_SECOND] * parameters[C_SECOND]
     modulus = modulus * narrowing * narrowing
-    pressure = modulus * denominator
-    slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * denominator)
-    half = 0.5 * parameters[GRUNEISEN_SECOND]
-    above = pressure * (1.0 - half * denominator)
-    above_slope = ratio * (slope * (1.0 - half * denominator) - half * pressure)
-    below = 1.0 / (1.0 - ratio * half * eta)
-    return above * below, (above_slope + above * ratio * half * below) * below
+    pressure = modulus * compression
+    slope = modulus * narrowing * (1.0 + parameters[S_SECOND] * compression)
+    # from there to the energy that a shock from the first phase gives
+    half_gamma = 0.5 * parameters[GRUNEISEN_SECOND]
+    numerator = pressure * (1.0 - half_gamma * compression)
+    numerator_slope = ratio * (slope * (1.0 - half_gamma * compression) - half_gamma * pressure)
+    inverse = 1.0 / (1.0 - ratio * half_gamma * eta)
+    return (
+        numerator * inverse,
+        (numerator_slope + numerator * ratio * half_gamma * inverse) * inverse,
+    )
 
 
 @inlined

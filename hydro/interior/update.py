@@ -15,6 +15,8 @@ from shockgrid.hydro.interior import scratch
 from shockgrid.hydro.rows import LEAST_C2
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 
+LEAST_SPEED_SQUARE = 1e-60  # over c²: slower cells are at rest
+
 
 @inlined
 def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
@@ -84,8 +86,8 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                 if withholds:
                     leaving_part = find_leaving_part(rho, parameters)
                     Z[scratch.SUM_EMPTIED + k] += 1.0 if leaving_part < 1.0 else 0.0
-                # kept, with velocities that are not subnormal
-                least_square = 1e-60 * c2
+                # kept, with velocities whose squares are not subnormal
+                least_square = LEAST_SPEED_SQUARE * c2
                 u = u if u * u > least_square else 0.0
                 v = v if v * v > least_square else 0.0
                 Z[scratch.RHO_NEW + k] = rho

@@ -40,10 +40,12 @@ from shockgrid.hydro.motion.line import Line
 from shockgrid.hydro.rows import END_INDEX
 from shockgrid.hydro.sliding.contact import SlidingContact
 from shockgrid.hydro.sliding.pieces import find_last_crossing, project_in_order
-from shockgrid.regrid.curves import compute_arc_lengths, meeting_laws
+from shockgrid.regrid.curves import compute_arc_lengths
 from shockgrid.regrid.errors import BadInput, Place, RegridFailure
+from shockgrid.regrid.spacings import meeting_laws
 
 JOINT_REACH_NODES = 3  # nodes of either line that the curve through a joint goes through
+ROUND_OFF_HEIGHT = 1e-9  # of a line's height: by how much nodes may lie beyond its ends
 MOST_JOINT_SLIDE = 4.0  # spacings that a joint wants to slide at most, before `relax`
 OPPOSITE_PART = (0.05, 0.95)  # where the parts of a side opposite to a contact point may meet
 ARRIVAL_STEPS = 1.5  # steps' motion before the leader's end at which a contact point arrives there
@@ -116,7 +118,7 @@ class TiedSeam:
         for line, height in zip((contact_nodes, other_nodes), heights[1:], strict=True):
             order = 1 if height[-1] > height[0] else -1
             lowest, highest = sorted((height[0], height[-1]))
-            slack = 1e-9 * (highest - lowest)
+            slack = ROUND_OFF_HEIGHT * (highest - lowest)
             if (order * np.diff(height) <= 0.0).any() or not (
                 (heights[0] >= lowest - slack) & (heights[0] <= highest + slack)
             ).all():

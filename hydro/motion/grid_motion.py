@@ -33,7 +33,11 @@ from shockgrid.regrid.protocol import (
 MOST_EXCESS = 0.3  # motion of a node not required by the boundary, in cell heights per full step
 
 SPARING_HALVINGS = 5  # of that motion, where it would crush a polygon cell
+LARGEST_LINK_GAP = (
+    1e-12  # over a line's extent: linked lines that a motion moves farther apart fail
+)
 
+QUALITY_NUMBERS = 4  # of `measure_worst`
 NO_COUNTS = (0, 0, 0, 0, 0, 0, math.inf)  # of a block that was not regridded
 
 MeshMotion = Callable[[str, float], np.ndarray]
@@ -123,7 +127,7 @@ class GridMotion:
             line = link.leader.line(link.leader.block.nodes_new)
             follower_line = link.follower.line(link.follower.block.nodes_new)
             gap = np.abs(link.arrange_for_follower(line) - follower_line).max()
-            if gap > 1e-12 * np.ptp(line, axis=1).max():
+            if gap > LARGEST_LINK_GAP * np.ptp(line, axis=1).max():
                 raise RegridFailure(
                     f"mesh motion: {link.leader} and {link.follower} are {gap:.1e} m apart",
                     cause="mesh-law",
@@ -142,20 +146,24 @@ class GridMotion:
         number = -1 if failure is None or not callable(self.mesh) else self._find_number(failure)
         if failure is None:
             number, failure = self._regrid_own(fraction)
-        rows = []
-        before = self.quality
+        # quality and counts of this rank's grids: known from the regridder, or measured
+        own_reports = []
+        quality_before = self.quality
         for own_number in self.blocks.own if failure is None else ():
             report = self.reports[own_number] if self.mesh == "regrid" else None
-            known = report.quality if report is not None and not self._limited[own_number] else None
-            if self.mesh == "fixed" and before is not None:
-                known = before[own_number]
-            known = known or measure_worst(self.blocks[own_number].nodes_new)
-            rows += [(*known, *self._count(own_number))]
+            quality = None
+            if report is not None and not self._limited[own_number]:
+                quality = report.quality
+            if self.mesh == "fixed" and quality_before is not None:
+                quality = quality_before[own_number]
+            quality = quality or measure_worst(self.blocks[own_number].nodes_new)
+            own_reports += [(*quality, *self._count(own_number))]
+        # those of all ranks
         self.quality = []
         self.counts = []
-        for row in self.blocks.exchange_nodes(rows, number, failure):
-            self.quality += [row[:4]]
-            self.counts += [row[4:]]
+        for numbers in self.blocks.exchange_nodes(own_reports, number, failure):
+            self.quality += [numbers[:QUALITY_NUMBERS]]
+            self.counts += [numbers[QUALITY_NUMBERS:]]
         if callable(self.mesh):
             self._check_lines()
 

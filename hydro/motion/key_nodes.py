@@ -185,7 +185,9 @@ class KeyNode:
                 )
                 # of two normals
                 cross = float(first_normal[0] * other_normal[1] - first_normal[1] * other_normal[0])
-                if abs(cross) < 1e-9 * math.hypot(*first_normal) * math.hypot(*other_normal):
+                if abs(cross) < STRAIGHT_LINE_SINE * math.hypot(*first_normal) * math.hypot(
+                    *other_normal
+                ):
                     raise RunFailure(
                         f"node: {first_segment} and {other_segment} have incompatible velocities",
                         cause="pistons-part",

@@ -21,6 +21,7 @@ from shockgrid.hydro.rim import NX, NY, U_STAR, C
 from shockgrid.regrid import curves
 from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.sides import SIDE_NAMES, find_node
+from shockgrid.regrid.spacings import arc_spacing
 
 # of the shorter face beside it: so far a node goes along a body's surface in a step
 MOST_RESPACED_PART = 0.1
@@ -347,7 +348,7 @@ class Line:
         self.rule = rule
         line = np.ascontiguousarray(segment.line(segment.block.nodes))
         self.track = Track(line)
-        self.spacing = curves.arc_spacing(line)
+        self.spacing = arc_spacing(line)
         self.last_spacing = None  # where it changes on the way
         if rule.respacing is not None and segment.side in ("j_min", "j_max"):
             self.last_spacing = rule.respacing.spacings.get(segment.block.name)

@@ -287,13 +287,14 @@ def describe_depth(block: Block, other_block: Block) -> str:
     """Describe which block reaches how far into the other, from the nodes along their sides."""
     deepest = 0.0, ""
     for inner, outer in ((block, other_block), (other_block, block)):
-        line = trace_outline(outer.nodes)
-        start = line
-        steps = np.roll(line, -1, axis=1) - line
+        # segments of the outer block's outline, but for those of no length
+        outline = trace_outline(outer.nodes)
+        steps = np.roll(outline, -1, axis=1) - outline
         square = (steps * steps).sum(axis=0)
-        start = start[:, square > 0.0]
+        start = outline[:, square > 0.0]
         steps = steps[:, square > 0.0]
         square = square[square > 0.0]
+        # the farthest of the inner one's nodes and middles of edges that lie inside
         nodes = trace_outline(inner.nodes)
         middles = 0.5 * (nodes + np.roll(nodes, -1, axis=1))
         for x, y in np.concatenate([nodes, middles], axis=1).T:

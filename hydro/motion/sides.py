@@ -36,6 +36,8 @@ from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.sides import OPPOSITE_SIDES, SIDE_NAMES
 
 TRACK_CORNER_SINE = 0.35  # sine of the angle from which two tracks that meet make a corner
+SMOOTH_JOINT_COSINE = 0.8  # of the angle up to which two lines go on into one another smoothly
+SAME_NODE_GAP = 1e-9  # over the next segment: ends so near are one node
 
 
 class StraightSides:
@@ -190,7 +192,7 @@ class Sides:
             line = self._find_line(segment)
             if line is None or not line.respaced:
                 continue
-            end = 0 if face == segment.first else 1
+            end = find_end_number(segment, face)
             node.damping.append(line.damping[:, END_INDEX[end]])
             for block, track in holding_tracks:
                 if block is segment.block:
@@ -210,7 +212,7 @@ class Sides:
         for segment, face in node.ends:
             line = self._find_line(segment)
             if line is not None and segment.linked and line.respaced:
-                ending_lines.append((line, 0 if face == segment.first else 1))
+                ending_lines.append((line, find_end_number(segment, face)))
         if (
             len(ending_lines) != 2
             or ending_lines[0][0].segment.kind != ending_lines[1][0].segment.kind
@@ -221,13 +223,13 @@ class Sides:
         other_position = other_line.track.nodes[:, END_INDEX[other_end]]
         direction = line.nodes_next_to(end)[:, 0] - position
         other_direction = other_line.nodes_next_to(other_end)[:, 0] - other_position
-        is_smooth = -(direction @ other_direction) > 0.8 * np.hypot(*direction) * np.hypot(
-            *other_direction
-        )
+        length = np.hypot(*direction)
+        other_length = np.hypot(*other_direction)
+        is_smooth = -(direction @ other_direction) > SMOOTH_JOINT_COSINE * length * other_length
         if (
             is_smooth
             and line is not other_line
-            and np.abs(position - other_position).max() < 1e-9 * np.hypot(*direction)
+            and np.abs(position - other_position).max() < SAME_NODE_GAP * length
         ):
             line.neighbours[end] = (other_line, other_end)
             other_line.neighbours[other_end] = (line, end)
@@ -274,7 +276,7 @@ class Sides:
                 return
         raise BadInput(f"{contact} and {next_contact} do not continue each other smoothly")
 
-    def carry(self, seam: Segment, contact: Segment, other_contact: Segment) -> None:
+    def tie_seam(self, seam: Segment, contact: Segment, other_contact: Segment) -> None:
         """Let a seam go with two contacts (leading segments all); see `motion.constraints`."""
         tied_seam = TiedSeam(seam, contact, other_contact)
         for face in (seam.first, seam.last - 1):
@@ -286,6 +288,11 @@ class Sides:
             node.is_tied = True
         self._by_segment[id(seam)].find_tied_displacement = tied_seam.compute_displacement
         self.tied_seams.append(tied_seam)
+
+
+def find_end_number(segment: Segment, face: int) -> int:
+    """At which end of a segment a face of the perimeter lies: 0 at the first, 1 at the last one."""
+    return 0 if face == segment.first else 1
 
 
 # --- passes; `hydro.step.SIDE_PASSES` says what each does, and why it stands where it does -------

@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+CLOSED_CHORD = 1e-9  # over a track's length: ends so near are one
+STRAIGHT_DEPARTURE = 1e-12  # from the chord, over its length, up to which a track is straight
+
 
 class Track:
     """A polyline `nodes` (2, n) and its arc lengths; closed where it ends at its first node."""
@@ -24,11 +27,12 @@ class Track:
         self.arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.nodes)))))
         chord = self.nodes[:, -1] - self.nodes[:, 0]
         length = float(np.hypot(*chord))
-        self.closed = length <= 1e-9 * self.arc[-1]
+        self.closed = length <= CLOSED_CHORD * self.arc[-1]
         self.straight = False
         if not self.closed:
             normal = np.array([-chord[1], chord[0]]) / length**2
-            self.straight = bool(np.abs(normal @ (self.nodes - self.nodes[:, :1])).max() < 1e-12)
+            departures = np.abs(normal @ (self.nodes - self.nodes[:, :1]))
+            self.straight = bool(departures.max() < STRAIGHT_DEPARTURE)
         chords = np.diff(self.nodes) / np.diff(self.arc)
         self.tangents = np.concatenate([chords[:, :1], chords[:, 1:] + chords[:, :-1],
                                         chords[:, -1:]], axis=1)  # fmt: skip
@@ -74,7 +78,7 @@ def join_tracks(track: Track, other_track: Track, point: np.ndarray) -> np.ndarr
 
     Also None where the other ends meet too: a closed track has no position to slide to or from.
     """
-    size = 1e-9 * (track.arc[-1] + other_track.arc[-1])
+    size = CLOSED_CHORD * (track.arc[-1] + other_track.arc[-1])
 
     def meets(track, end):
         return np.abs(track.nodes[:, end] - point).max() <= size

@@ -435,8 +435,8 @@ def overlay_grids(
 ) -> Overlay:
     """Lay a grid `new_nodes` (2, mi+1, mj+1) over `nodes` (2, ni+1, nj+1), both [m], convex.
 
-    centres (2, ni, nj): of volume; fields (ni, nj, n, 3): `hydro.remap.overlay`; curved: y is the
-    distance from an axis, volumes are per radian.
+    centres (2, ni, nj): of volume; fields (ni, nj, n, 3): mean of n quantities in each cell, and
+    their slopes in x and y; curved: y is the distance from an axis, volumes are per radian.
     """
     ni, nj, count, _ = fields.shape
     new_nodes = np.ascontiguousarray(new_nodes, dtype=np.float64)

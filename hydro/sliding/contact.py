@@ -50,9 +50,12 @@ from shockgrid.hydro.sliding.pieces import (
     project_in_order,
 )
 from shockgrid.hydro.sliding.polygons import make_add_closing_flux, make_fill_excess_volume
-from shockgrid.regrid.curves import arc_spacing
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.crossings import find_self_crossing
+from shockgrid.regrid.spacings import arc_spacing
+
+SAME_NODE_GAP = 1e-9  # over the contact's extent: nodes so near are one
+LARGEST_FOLLOWER_GAP = 1e-6  # over its extent: how far the follower's nodes may be off the leader
 
 
 class Chain:
@@ -197,7 +200,7 @@ def _find_orders(segments: list[Sliding]) -> list[bool]:
     size = max(np.ptp(line, axis=1).max() for line in lines)
 
     def lie_together(a, b):
-        return np.abs(a - b).max() < 1e-9 * size
+        return np.abs(a - b).max() < SAME_NODE_GAP * size
 
     orders = [not any(lie_together(lines[0][:, -1], lines[1][:, k]) for k in (0, -1))]
     for before, line, segment in zip(lines, lines[1:], segments[1:], strict=False):
@@ -252,7 +255,10 @@ class SlidingContact:
         self.fixed = np.full(2, -1)
         for end, candidates in ((0, (last, 0)), (1, (0, last))):  # on a ring both would do
             for node in candidates:
-                if np.abs(follower_line[:, END_INDEX[end]] - line[:, node]).max() < 1e-9 * size:
+                if (
+                    np.abs(follower_line[:, END_INDEX[end]] - line[:, node]).max()
+                    < SAME_NODE_GAP * size
+                ):
                     self.fixed[end] = node
             if self.fixed[end] >= 0:
                 follower_line[:, END_INDEX[end]] = line[:, self.fixed[end]]
@@ -262,7 +268,7 @@ class SlidingContact:
         points = np.empty_like(follower_line)
         fill_points(line, positions, points)
         gap = np.abs(points - follower_line).max() / np.ptp(follower_line, axis=1).max()
-        if gap > 1e-6:
+        if gap > LARGEST_FOLLOWER_GAP:
             raise BadInput(
                 f"sliding: nodes of {follower[0]} lie up to {gap:.1e} of the contact's length off "
                 f"the line of {leader[0]}"
@@ -440,7 +446,7 @@ class SlidingContact:
 
 def _find_crossing(line: np.ndarray) -> tuple[int, int] | None:
     """Faces at which a line touches itself; the ends of a ring may."""
-    if np.abs(line[:, 0] - line[:, -1]).max() > 1e-9 * np.ptp(line, axis=1).max():
+    if np.abs(line[:, 0] - line[:, -1]).max() > SAME_NODE_GAP * np.ptp(line, axis=1).max():
         return find_self_crossing(line)
     crossing = find_self_crossing(line[:, :-1])
     if crossing is None:

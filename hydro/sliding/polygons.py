@@ -42,12 +42,13 @@ def make_fill_excess_volume(geometry: Geometry = PLANE):
             x = 0.0
             y = 0.0
             doubled_volume = 0.0
-            a = int(positions[k]) + 1
-            while a < positions[k + 1]:
-                next_x, next_y = leader[0, a] - x0, leader[1, a] - y0
+            # triangles from the face's first node to the leader's segments, and to its last node
+            leader_node = int(positions[k]) + 1
+            while leader_node < positions[k + 1]:
+                next_x, next_y = leader[0, leader_node] - x0, leader[1, leader_node] - y0
                 doubled_volume += weigh_triangle(x * next_y - next_x * y, y0, y, next_y)
                 x, y = next_x, next_y
-                a += 1
+                leader_node += 1
             doubled_volume += weigh_triangle(x * end_y - end_x * y, y0, y, end_y)
             excess_volume[k] = -0.5 * orientation * doubled_volume
 

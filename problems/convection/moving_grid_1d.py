@@ -22,7 +22,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from shockgrid.hydro.convection.columns import DRAWN_BLOCK_HEIGHT, FAMILIES, FrontRace, Placing
+from shockgrid.hydro.convection.columns import DRAWN_BLOCK_HEIGHT
+from shockgrid.hydro.convection.fronts import FAMILIES, FrontRace, Placing
 from shockgrid.problems.deck import Deck, DeckTable, RunControl, key
 from shockgrid.problems.problem import BlockPlan, Problem
 from shockgrid.problems.references.convection import BurgersFronts

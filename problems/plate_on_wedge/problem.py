@@ -51,7 +51,7 @@ from shockgrid.problems.references.shock_polars import (
     solve_collision,
 )
 from shockgrid.problems.solids import SolidDeck, find_laws
-from shockgrid.regrid.curves import arc_spacing, clustered_spacing, meeting_laws
+from shockgrid.regrid.spacings import arc_spacing, clustered_spacing, meeting_laws
 
 Cells = Annotated[int, Meta(ge=1, le=MOST_CELLS)]
 

@@ -224,9 +224,9 @@ class CoarseCorrection:
 
     def __init__(self, ni: int, nj: int, tuning):
         self.tuning = tuning
-        parts_i = ni // min(
-            max(ni // tuning.coarse_stretches, tuning.coarse_lines // 2), tuning.coarse_lines
-        )
+        # how many coarse cells along i, and along j on each level
+        lines_apart = max(ni // tuning.coarse_stretches, tuning.coarse_lines // 2)
+        parts_i = ni // min(lines_apart, tuning.coarse_lines)
         parts_j = [nj // apart for apart in tuning.coarse_apart if nj // apart >= 2]
         self.is_possible = ni * nj >= tuning.coarse_from and parts_i >= 2 and bool(parts_j)
         if not self.is_possible:

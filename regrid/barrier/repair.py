@@ -38,6 +38,7 @@ from shockgrid.regrid.sides import compute_area
 MOST_PROJECTION_ROUNDS = 20  # of projection
 # how far a projected node goes past the segment, over the segment's length
 PROJECTION_OVERSHOOT = 0.05
+LEAST_END_FRACTION = 0.1  # of a segment, from either end, that a node is not projected to
 LOCAL_FOLD_FRACTION = 0.02  # part of the cells up to which folds are local and projection is tried
 NAMED_CELLS = 8
 
@@ -165,7 +166,8 @@ def _project_node(nodes, excluded, place: tuple[int, int], first, second) -> boo
     square = float(step @ step)
     if square == 0.0:
         return False
-    fraction = min(max(float((old_place - first) @ step) / square, 0.1), 0.9)
+    fraction = float((old_place - first) @ step) / square
+    fraction = min(max(fraction, LEAST_END_FRACTION), 1.0 - LEAST_END_FRACTION)
     # Past the segment is to its right, so that first -> second turns left round the node.
     outward = np.array([step[1], -step[0]])
     for overshoot in (PROJECTION_OVERSHOOT, -PROJECTION_OVERSHOOT):

@@ -81,6 +81,7 @@ COARSE_EDGES = 32  # a side's arc is measured on no more edges than about this m
 # arc excess that every side is taken to have, so that flat blocks weigh evenly
 ADDED_ARC_EXCESS = 0.001
 STRAIGHT_ARC_EXCESS = 1e-6  # up to which a pair of sides is straight
+LEAST_CHORD = 1e-3  # over the arc, of a side that nearly closes
 SHORTEST_CONDITIONAL_LENGTH = 1e-6  # shortest conditional length, relative to the side's mean edge
 
 
@@ -116,7 +117,7 @@ def compute_arc_excess(x, y):
         arc += np.sqrt(step_x * step_x + step_y * step_y)
         old_x, old_y = new_x, new_y
     chord_x, chord_y = x[last] - x[0], y[last] - y[0]
-    chord = max(np.sqrt(chord_x * chord_x + chord_y * chord_y), 1e-3 * arc)
+    chord = max(np.sqrt(chord_x * chord_x + chord_y * chord_y), LEAST_CHORD * arc)
     return arc / chord - 1.0 if arc > 0.0 else 0.0
 
 
@@ -347,20 +348,20 @@ def compute_limiting_rate(sound, along_i, along_j, blend_i, blend_j, area_target
     s_i s_j, as in `BarrierInputs`.
     """
     ni, nj = sound.shape
-    columns = np.zeros(nj)
+    places_j = np.zeros(nj)
     rates = np.zeros(nj)
     for j in range(nj):
-        columns[j] = 0.5 * (blend_j[j] + blend_j[j + 1])
+        places_j[j] = 0.5 * (blend_j[j] + blend_j[j + 1])
     for i in range(ni):
-        u = 0.5 * (blend_i[i] + blend_i[i + 1])
+        place_i = 0.5 * (blend_i[i] + blend_i[i + 1])
         length = along_i[LENGTH, i]
         change = along_i[LENGTH_CHANGE, i]
-        row = sound[i]
+        sound_row = sound[i]
         # the largest of each column: a single one would keep the loop from the vectoriser
         for j in range(nj):
-            s_i = length + columns[j] * change
-            s_j = along_j[LENGTH, j] + u * along_j[LENGTH_CHANGE, j]
-            ratio = row[j] / (s_i * s_j)
+            s_i = length + places_j[j] * change
+            s_j = along_j[LENGTH, j] + place_i * along_j[LENGTH_CHANGE, j]
+            ratio = sound_row[j] / (s_i * s_j)
             square = (s_i * s_i + s_j * s_j) * (ratio * ratio)
             rates[j] = square if square > rates[j] else rates[j]
     most = 0.0

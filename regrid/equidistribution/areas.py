@@ -44,6 +44,9 @@ from shockgrid.regrid.protocol import RegridReport, RegridResult
 A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
 SMALLEST_TAU = 1.0  # for two-cell modes; the largest, for the block's modes, follows from its size
+LEAST_CYCLED_TAU = 0.25  # of a step, however often tau has been lowered
+LEAST_TAU_FACTOR = 0.01  # by which tau has been lowered, at most
+LEAST_DIRECTION_SHARE = 0.05  # of the weaker direction in the coefficients
 LEAST_SINE = 0.1  # of a corner: below this the iteration is starting to fold
 
 
@@ -261,9 +264,10 @@ class Ed2Operator:
             if iteration > 0:
                 worse = residuals[-1] > residuals[-1 - self.taus.size]
                 factor = self.tau_factor
-                self.tau_factor = max(0.25 * factor, 0.01) if worse else min(2.0 * factor, 1.0)
+                smaller = max(0.25 * factor, LEAST_TAU_FACTOR)
+                self.tau_factor = smaller if worse else min(2.0 * factor, 1.0)
             self.taus = choose_taus(self)
-        return max(self.tau_factor * self.taus[iteration % self.taus.size], 0.25)
+        return max(self.tau_factor * self.taus[iteration % self.taus.size], LEAST_CYCLED_TAU)
 
     def measure_sine(self, nodes: np.ndarray) -> float:
         """Least corner sine; 0 unless every cell is convex and oriented like the start."""
@@ -290,7 +294,7 @@ def choose_taus(operator: Ed2Operator) -> np.ndarray:
     """
     n = min(operator.shape)
     share = 0.5 * operator.flux[: B + 1].sum(axis=(1, 2))
-    weak = max(float(share.min() / share.sum()), 0.05)
+    weak = max(float(share.min() / share.sum()), LEAST_DIRECTION_SHARE)
     return make_cycle(1.0 / (weak * (np.pi / n) ** 2))
 
 

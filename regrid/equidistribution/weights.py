@@ -38,11 +38,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shockgrid.regrid.barrier.side_inputs import LENGTH, LENGTH_CHANGE, fill_spacings
-from shockgrid.regrid.curves import arc_spacing, solve_ed1
 from shockgrid.regrid.errors import BadInput, suggest
 from shockgrid.regrid.measure.corners import compute_centres
 from shockgrid.regrid.measure.quality import compute_corner_areas
 from shockgrid.regrid.sides import SIDE_NAMES, SIDES
+from shockgrid.regrid.spacings import arc_spacing, solve_ed1
 
 OPERATORS = {
     ast.Add: operator.add,

@@ -24,6 +24,11 @@ from shockgrid.regrid.measure.hexahedra import compute_corner_volumes, find_bad_
 FACES = ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max")
 LEAST_LENGTH = 1e-6  # of a family's mean edge
 ADDED_FACE_BEND = 1e-3  # added to the curvature measure of a pair of faces
+CLOSED_FACE_AREA = (
+    1e-12  # of its plane image over its own, of a face that is bent all the way round
+)
+MOST_FACE_EXCESS = 1e6  # of a face's area over its plane image, as it counts
+PLANE_POINTS_RATIO = 1e-12  # of the moments of points: smaller ones are those of a plane
 
 
 def get_face(nodes: np.ndarray, axis: int, end: int) -> np.ndarray:
@@ -60,7 +65,7 @@ def compute_edge_spacings(nodes: np.ndarray) -> list[np.ndarray]:
 def measure_bend(face: np.ndarray) -> float:
     """Area of a face (3, n, m) over the magnitude of its vector area, minus one; 0 if it is plane.
 
-    Nodes are smoothed by (1, 2, 1)/4 both line_weights, so that noise does not count as curvature.
+    Nodes are smoothed by (1, 2, 1)/4 in both directions, so that noise does not count as curvature.
     """
     smoothed = face.copy()
     smoothed[:, 1:-1] = 0.25 * (face[:, :-2] + 2.0 * face[:, 1:-1] + face[:, 2:])
@@ -72,7 +77,9 @@ def measure_bend(face: np.ndarray) -> float:
     vector_sum = areas.sum(axis=(1, 2))
     area_sum = np.sqrt((areas * areas).sum(axis=0)).sum()
     plane_area = np.sqrt((vector_sum * vector_sum).sum())
-    return float(max(0.0, area_sum / plane_area - 1.0)) if plane_area > 1e-12 * area_sum else 1e12
+    if not plane_area > CLOSED_FACE_AREA * area_sum:
+        return 1.0 / CLOSED_FACE_AREA
+    return float(max(0.0, area_sum / plane_area - 1.0))
 
 
 def _vector_areas(face: np.ndarray) -> np.ndarray:
@@ -88,7 +95,7 @@ def compute_family_weights(nodes: np.ndarray) -> np.ndarray:
         max(measure_bend(get_face(nodes, axis, end)) for end in (0, -1)) + ADDED_FACE_BEND
         for axis in range(3)
     ]
-    squares = np.minimum(excesses, 1e6) ** 2
+    squares = np.minimum(excesses, MOST_FACE_EXCESS) ** 2
     return squares / squares.sum()
 
 
@@ -289,7 +296,7 @@ def fit_affine(points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     centred = centred - centred.mean(axis=1, keepdims=True)
     moved = moved - moved.mean(axis=1, keepdims=True)
     products = centred @ centred.T
-    return (moved @ centred.T) @ np.linalg.pinv(products, rcond=1e-12, hermitian=True)
+    return (moved @ centred.T) @ np.linalg.pinv(products, rcond=PLANE_POINTS_RATIO, hermitian=True)
 
 
 def gather_faces(nodes: np.ndarray) -> np.ndarray:

@@ -425,15 +425,17 @@ def fill_edges(nodes, inverse, i, j, start, Z):
 def fill_cell_rows(lengths, cells, i, j, n, Z):
     """Inverse lengths and straight-line weights of the eight rows of edges, weights of `cells`."""
     for edge in range(8):
-        axis = EDGES[edge][0]
-        p = i + EDGES[edge][1]
-        q = j + EDGES[edge][2]
+        axis, offset_i, offset_j = EDGES[edge]
+        p = i + offset_i
+        q = j + offset_j
         inverse = lengths.inverse[axis][p, q]
         line_weight = lengths.line_weights[axis][q if axis == 0 else p]
-        row = INVERSE + edge * HEXAHEDRON_SPAN
+        inverse_row = INVERSE + edge * HEXAHEDRON_SPAN
+        straight_row = STRAIGHT + edge * HEXAHEDRON_SPAN
         for k in range(inverse.shape[0]):
-            Z[row + k] = inverse[k]
-            Z[row + 8 * HEXAHEDRON_SPAN + k] = line_weight[k] if axis < 2 else line_weight[q]
+            Z[inverse_row + k] = inverse[k]
+            Z[straight_row + k] = line_weight[k] if axis < 2 else line_weight[q]
+    # each of a cell's eight corners has an eighth of its weight
     for k in range(n):
         Z[WEIGHT + k] = 0.125 * lengths.scale * cells[k]
 

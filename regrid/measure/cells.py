@@ -32,6 +32,11 @@ ON_EDGE = 1e-12  # of a cell: so far beyond a side counts as inside
 MOST_ITERATIONS = 30
 MOST_QUADS = 12  # that are tried around the cell
 CONVERGED_DISTANCE = 1e-14  # of the distance between centres
+ROUND_OFF_DISTANCE = (
+    1e3 * CONVERGED_DISTANCE
+)  # of the same, that an iteration which stops falling has left
+FARTHEST_PART = 1e3  # of a cell: an iteration so far away does not come back
+LARGEST_NUMBER = 1e300  # coordinates beyond are no place
 UNIT_PARTS = 1e-12
 
 
@@ -173,7 +178,7 @@ def _solve_quad(nodes, a, b, x, y):
             least_residual = size
             best_s = s
             best_t = t
-        elif size <= 1e3 * CONVERGED_DISTANCE * scale:
+        elif size <= ROUND_OFF_DISTANCE * scale:
             break  # round-off
         ds_x, ds_y = xs + t * xst, ys + t * yst
         dt_x, dt_y = xt + s * xst, yt + s * yst
@@ -182,9 +187,9 @@ def _solve_quad(nodes, a, b, x, y):
             break
         s += (rx * dt_y - dt_x * ry) / determinant
         t += (ds_x * ry - rx * ds_y) / determinant
-        if not (abs(s) < 1e3 and abs(t) < 1e3):
+        if not (abs(s) < FARTHEST_PART and abs(t) < FARTHEST_PART):
             break
-    return best_s, best_t, least_residual <= 1e3 * CONVERGED_DISTANCE * scale
+    return best_s, best_t, least_residual <= ROUND_OFF_DISTANCE * scale
 
 
 @compiled_once
@@ -238,7 +243,7 @@ def find_places(nodes, points, reach, cells, quads, parts, where):
     for k in range(points.shape[1]):
         x, y = points[0, k], points[1, k]
         where[k] = OUTSIDE_BLOCK
-        if not (abs(x) < 1e300 and abs(y) < 1e300):  # nan, too
+        if not (abs(x) < LARGEST_NUMBER and abs(y) < LARGEST_NUMBER):  # nor for nan
             continue
         # the cell with the point: by a walk, else one after another
         i, j = min(max(cells[0, k], 0), ni - 1), min(max(cells[1, k], 0), nj - 1)

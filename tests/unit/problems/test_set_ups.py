@@ -22,10 +22,10 @@ from shockgrid.problems.riemann import (
     SideState,
     grade,
 )
-from shockgrid.regrid.curves import REFINED_STEP_RATIO, meeting_laws
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.measure.quality import find_bad_cells
 from shockgrid.regrid.registry import REGRIDDERS
+from shockgrid.regrid.spacings import REFINED_STEP_RATIO, meeting_laws
 
 
 def make(left, right, **options) -> Riemann:

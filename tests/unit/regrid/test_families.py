@@ -7,10 +7,10 @@ from builders import make_tensor_grid, tensor
 from shockgrid.regrid.algebraic import fill_displacement, quasi_1d_grid, transfinite_grid
 from shockgrid.regrid.barrier.tuning import Tuning
 from shockgrid.regrid.barrier.workspace import Workspace
-from shockgrid.regrid.curves import arc_spacing
 from shockgrid.regrid.domains import make_domain
 from shockgrid.regrid.protocol import RegridReport
 from shockgrid.regrid.sides import SIDES
+from shockgrid.regrid.spacings import arc_spacing
 from shockgrid.regrid.variational import (
     BLOCK_CORNERS,
     IvanenkoCharakhchyanRegridder,

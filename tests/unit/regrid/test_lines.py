@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from shockgrid.regrid import curves as spacing
-from shockgrid.regrid.curves import (
-    arc_spacing,
-    clustered_spacing,
-    compute_arc_lengths,
-    fill_turning_spacing,
-    redistribute,
-    uniform_spacing,
-)
+from shockgrid.regrid import spacings
+from shockgrid.regrid.curves import compute_arc_lengths, fill_turning_spacing, redistribute
 from shockgrid.regrid.measure.quality import measure_turns
+from shockgrid.regrid.spacings import arc_spacing, clustered_spacing, uniform_spacing
 
 
 @pytest.mark.parametrize("shape", ["chord", "spline"])
@@ -63,22 +57,22 @@ def test_nodes_never_pass_each_other(shape):
 
 def test_geometric_law_has_its_ratio():
     for ratio in (0.8, 1.0, 1.3):
-        steps = np.diff(spacing.geometric_spacing(9, ratio))
+        steps = np.diff(spacings.geometric_spacing(9, ratio))
         assert np.allclose(steps[1:] / steps[:-1], ratio)
-    assert np.isfinite(spacing.geometric_spacing(2000, 3.0)).all()
+    assert np.isfinite(spacings.geometric_spacing(2000, 3.0)).all()
 
 
 @pytest.mark.parametrize("first", [1e-6, 0.01, 0.1, 0.1 + 1e-9, 0.3])
 def test_clustered_law_begins_with_the_wanted_step(first):
-    law = spacing.clustered_spacing(11, first)
+    law = spacings.clustered_spacing(11, first)
     assert np.isclose(law[1], first, rtol=1e-9)
     assert law[0] == 0.0 and law[-1] == 1.0 and np.diff(law).min() > 0.0
-    assert np.allclose(spacing.clustered_spacing(11, first, at_end=True), 1.0 - law[::-1])
+    assert np.allclose(spacings.clustered_spacing(11, first, at_end=True), 1.0 - law[::-1])
 
 
 def test_equidistribution_of_steps_is_exact():
     nodes = np.array([0.0, 1.0, 2.0, 4.0])
-    placed = spacing.equidistribute(nodes, np.array([3.0, 1.0, 1.0]), count=7)
+    placed = spacings.equidistribute(nodes, np.array([3.0, 1.0, 1.0]), count=7)
     assert np.allclose(placed, [0.0, 1 / 3, 2 / 3, 1.0, 2.0, 3.0, 4.0])
 
 
@@ -87,7 +81,7 @@ def weight(x):
 
 
 def test_ed1_products_are_equal_to_round_off():
-    x = spacing.solve_ed1(weight, 61)
+    x = spacings.solve_ed1(weight, 61)
     products = weight(0.5 * (x[1:] + x[:-1])) * np.diff(x)
     assert np.ptp(products) < 1e-12 * products.mean()
     assert np.diff(x).min() > 0.0

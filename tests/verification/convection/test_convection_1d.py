@@ -14,8 +14,8 @@ from shockgrid.hydro.convection.columns import (
     settle_column,
     solve_column,
     step_column,
-    step_front,
 )
+from shockgrid.hydro.convection.fronts import step_front
 from shockgrid.hydro.convection.tensor_grids import make_axis
 from shockgrid.problems.convection.convection_1d import measure_errors
 from shockgrid.problems.convection.moving_grid_1d import MovingGrid1D, MovingGrid1DDeck, PlacingPart

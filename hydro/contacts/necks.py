@@ -21,7 +21,8 @@ from shockgrid.hydro.facets.lines import compute_normal, measure_square, project
 from shockgrid.regrid.jit import compiled_once, kernel
 
 THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinner necks are cut
-THINNEST_FOLLOWED_PART = 0.5  # the same where the time step collapses in this block
+THINNEST_FOLLOWED_PART = 0.15  # the same where the time step collapses in this block
+TIP_CELLS = 1.0  # cells: if less lies beyond a thin place, it is a tip, and no body is in two parts
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
 # of the size: a node so near to a face lies on it from outside; a film is cut long before
@@ -72,17 +73,19 @@ def is_in_front(outlines, face, part, x, y, node_x, node_y):
 
 @kernel
 def find_thinnest(outlines, inner, sizes, widest):
-    """The node at which a body is thinnest by its size: (node, its width over its size).
+    """The node at which a body is thinnest by its size: (node, first node of the face on the other
+    side, width over size).
 
     inner (2, N): the next nodes inwards; sizes (N,): of the cells of the block that each node
-    belongs to [m].  Widths above `widest` sizes are not looked for: (NO_FACE, most) where there is
-    none below.
+    belongs to [m].  Widths above `widest` sizes are not looked for; the first two are NO_FACE where
+    there is none below.
     """
     nodes = outlines.nodes
     boxes = outlines.boxes
     fill_face_boxes(outlines)
     thinnest = widest
     at = NO_FACE
+    opposite = NO_FACE
     for node in range(nodes.shape[1]):
         if outlines.twins[node] < node:
             continue
@@ -118,7 +121,42 @@ def find_thinnest(outlines, inner, sizes, widest):
                 thinnest = away**0.5 / size
                 reach = thinnest * size
                 at = node
-    return at, thinnest
+                opposite = start
+    return at, opposite, thinnest
+
+
+@kernel
+def measure_beyond(outlines, node, opposite):
+    """Area [m²] of the smaller part of a body on either side of a thin place.
+
+    From the node along the outline to the face that begins at `opposite`, one way and the other;
+    1e300 where the outline ends before.
+    """
+    nodes = outlines.nodes
+    smaller = 1e300
+    for direction in (1, -1):
+        area = 0.0
+        x, y = nodes[0, node], nodes[1, node]
+        k = node
+        for _ in range(outlines.starts.shape[0]):
+            face = outlines.after[k] if direction == 1 else outlines.before[k]
+            if face == NO_FACE:
+                area = 1e300
+                break
+            start = outlines.starts[face]
+            first, second = (start, start + 1) if direction == 1 else (start + 1, start)
+            # up to the middle of the face on the other side
+            is_last = start == opposite
+            x_end, y_end = nodes[0, second], nodes[1, second]
+            if is_last:
+                x_end, y_end = 0.5 * (x_end + nodes[0, first]), 0.5 * (y_end + nodes[1, first])
+            x_first, y_first = nodes[0, first] - x, nodes[1, first] - y
+            area += 0.5 * (x_first * (y_end - y) - y_first * (x_end - x))
+            if is_last:
+                break
+            k = second
+        smaller = min(smaller, abs(area))
+    return smaller
 
 
 class Necks:
@@ -147,30 +185,35 @@ class Necks:
             self.inner[:, span] = inner
 
     def find_cut(self, collapsing: Block | None = None) -> str | None:
-        """A sentence about the place where a body is cut now, or None.
+        """A sentence about the place where a body is cut now, or a corner is a film; or None.
 
         collapsing: the block of which the grid lets the time step collapse, if it does.
         """
         outlines = self.bodies.outlines
         if self._least_part is None:
             outlines.nodes[...] = self._first_nodes
-            _, first = find_thinnest.entry(outlines, self._first_inner, self.sizes, 1.0)
+            _, _, first = find_thinnest.entry(outlines, self._first_inner, self.sizes, 1.0)
             self._least_part = min(THINNEST_CELL_PART, THINNEST_FIRST_PART * float(first))
         self._read()
-        node, part = find_thinnest.entry(outlines, self.inner, self.sizes, self._least_part)
+        node, opposite, part = find_thinnest.entry(
+            outlines, self.inner, self.sizes, self._least_part
+        )
         beyond = ""
         if node == NO_FACE and collapsing is not None:
             sizes = np.where(self._find_nodes(collapsing), self.sizes, 0.0)
-            node, part = find_thinnest.entry(outlines, self.inner, sizes, THINNEST_FOLLOWED_PART)
+            node, opposite, part = find_thinnest.entry(
+                outlines, self.inner, sizes, THINNEST_FOLLOWED_PART
+            )
             beyond = ", which no grid follows further"
         if node == NO_FACE:
             return None
         surface = self.bodies.find_surface(int(node))
         x, y = outlines.nodes[:, node]
+        is_tip = measure_beyond.entry(outlines, node, opposite) < TIP_CELLS * self.sizes[node] ** 2
+        event = "a corner is drawn out to a film" if is_tip else "a body is cut"
         return (
-            f"a body is cut: {surface} has come within {part * self.sizes[node]:.3g} m, {part:.2g} "
-            f"of a cell, of another surface of the same body at x = {x:.6g} m, y = {y:.6g} m"
-            f"{beyond}"
+            f"{event}: {surface} has come within {part * self.sizes[node]:.3g} m, {part:.2g} of a "
+            f"cell, of another surface of the same body at x = {x:.6g} m, y = {y:.6g} m{beyond}"
         )
 
     def _find_nodes(self, block: Block) -> np.ndarray:

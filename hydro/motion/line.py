@@ -23,8 +23,8 @@ from shockgrid.regrid.jit import compiled_once, kernel
 from shockgrid.regrid.sides import SIDE_NAMES, find_node
 from shockgrid.regrid.spacings import arc_spacing
 
-# of the shorter face beside it: so far a node goes along a body's surface in a step
-MOST_RESPACED_PART = 0.1
+# of the face towards which it goes: so far a node goes along a body's surface in a step
+MOST_RESPACED_PART = 0.03
 # part of the way to its spacing that a line at or opposite a contact point goes in a full step
 FOLLOWED_WAY_PART = 0.2
 
@@ -131,13 +131,15 @@ def move_parallel_to_neighbours(moved, arc, positions, out):
     arc, positions (n,): where each is along the line and where it is to be.  A node that goes
     parallel to the chord between its neighbours takes nothing from the body and adds nothing.  On
     the line's own chords it would cut every convex tip, and press on it like a piston.  Where the
-    line turns back it goes less far, and nowhere further than MOST_RESPACED_PART of the shorter
-    face beside it: no node passes another.  Theory F16.9.
+    line turns back it goes less far, and nowhere further than MOST_RESPACED_PART of the face
+    towards which it goes: no node passes another, and a short face beside a long one, as at the
+    root of a jet, grows at once.  Theory F16.9.
     """
     for k in range(1, moved.shape[1] - 1):
         length = arc[k + 1] - arc[k - 1]
-        farthest = MOST_RESPACED_PART * min(arc[k] - arc[k - 1], arc[k + 1] - arc[k]) / length
-        fraction = min(farthest, max(-farthest, (positions[k] - arc[k]) / length))
+        forwards = MOST_RESPACED_PART * (arc[k + 1] - arc[k]) / length
+        backwards = MOST_RESPACED_PART * (arc[k] - arc[k - 1]) / length
+        fraction = min(forwards, max(-backwards, (positions[k] - arc[k]) / length))
         for c in range(2):
             out[c, k] = moved[c, k] + fraction * (moved[c, k + 1] - moved[c, k - 1])
 

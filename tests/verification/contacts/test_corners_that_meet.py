@@ -207,3 +207,28 @@ def test_corners_at_a_joint_do_not_pass_each_other(materials, lean):
     assert min(gaps) > -0.01
     assert max(row["contact_overlap"] for row in rows[1:]) < 0.1
     check_budget(rows, names=("momentum_y", "energy"))
+
+
+@pytest.mark.parametrize(
+    ("material", "part"),
+    [("Al1100", 0.52), pytest.param("Al1100", 1.0, marks=pytest.mark.slow),
+     pytest.param("Cu", 1.0, marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_a_jet_runs_on(material, part):
+    """Past the critical angle, for a part of the time until the whole plate has come down.
+
+    At the jet's root a short face is beside long ones; the surface must not fold about it.
+    """
+    degrees = {"Al1100": 40.0, "Cu": 45.0}[material]
+    speed = 1500.0
+    length = 56 * CELL
+    nodes = turn(box((0.0, 0.0), (length, 14 * CELL), (56, 14)), degrees)
+    nodes[1] += 0.5 * CELL
+    u, v = -speed * turn(np.array([0.0, 1.0]), degrees)
+    plate = make_body("plate", material, nodes, u, v)
+    free(plate, *SIDES)
+    t_end = part * 0.8 * length * np.sin(np.radians(degrees)) / speed
+    rows = march_whole(Simulation([plate, make_far_wall()], [], t_end=t_end, cfl=0.7))
+    assert rows[-1]["contacts_made"] > 0
+    assert max(row["cells_not_convex"] for row in rows[1:]) == 0
+    check_budget(rows, names=("energy",))

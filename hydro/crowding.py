@@ -48,6 +48,7 @@ def choose_bin(counts, cells, share, ratio):
     while chosen_bin > 0 and above + counts[chosen_bin] <= allowed:
         above += counts[chosen_bin]
         chosen_bin -= 1
+    # a bin holds the numbers whose leading bits it is
     edges = np.empty(2, dtype=np.int64)
     edges[0] = (chosen_bin + FIRST_BIN) << BIN_SHIFT
     edges[1] = (top + 1 + FIRST_BIN) << BIN_SHIFT

@@ -141,14 +141,14 @@ def iterate_winslow(
     nodes: np.ndarray, control: str = "sides", iterations: int = 100, tolerance: float = 1e-8
 ) -> tuple[int, float]:
     """Move the inner `nodes` (2, ni+1, nj+1) to the solution; iterations done, last residual."""
-    n = nodes.shape[1] - 2
-    m = nodes.shape[2] - 2
+    inner_i = nodes.shape[1] - 2
+    inner_j = nodes.shape[2] - 2
     steps_i, steps_j = compute_inverse_steps(nodes, control)
     across = np.ascontiguousarray(steps_j.T)
-    residual = np.empty((2, n, m))
-    sums = np.empty((2, n))
-    scale_i, scale_j = np.empty((2, n, m))
-    taus = make_cycle((min(n, m) / np.pi) ** 2)
+    residual = np.empty((2, inner_i, inner_j))
+    sums = np.empty((2, inner_i))
+    scale_i, scale_j = np.empty((2, inner_i, inner_j))
+    taus = make_cycle((min(inner_i, inner_j) / np.pi) ** 2)
     for iteration in range(iterations + 1):
         fill_equation(nodes, steps_i, across, residual, scale_i, scale_j, sums)
         size, term_squares = sums.sum(axis=1)

@@ -27,6 +27,10 @@ from shockgrid.regrid.spacings import arc_spacing
 MOST_RESPACED_PART = 0.03
 # part of the way to its spacing that a line at or opposite a contact point goes in a full step
 FOLLOWED_WAY_PART = 0.2
+# index in a line's `location` of its first face on the perimeter; before it stand side, first node
+# and number of nodes, after it where its spacing begins in an array of several
+FIRST_FACE = 3
+ONLY_MOVED = -1.0  # in place of `relax`: the line is spread later, once others have cut it
 
 
 class StepTime(NamedTuple):
@@ -167,11 +171,28 @@ def write_line(nodes_new, location, line):
         nodes_new[1, i, j] = line[1, k]
 
 
+class LineArrays(NamedTuple):
+    """Arrays of a line of n nodes, as kernels take them.
+
+    damping (2, n) and extra_velocity (2, n): velocities besides that of the contact [m/s]; moved
+    (2, n): its nodes after the flow has moved them; spacing (n,), and turned_spacing (n,) with
+    shorter segments where it bends; turning (n - 1,); scratch (8, n).
+    """
+
+    damping: np.ndarray
+    extra_velocity: np.ndarray
+    moved: np.ndarray
+    spacing: np.ndarray
+    turned_spacing: np.ndarray
+    turning: np.ndarray
+    scratch: np.ndarray
+
+
 @compiled_once
 def respace_line(moved, spacing, relax, shape, walls, work):
     """Spread the nodes `moved` (2, n) along their line into the rows 6 and 7 of `work` (8, n).
 
-    relax: how far they go to the spacing; shape: as of `carry_line`.  Returns what
+    relax: how far they go to the spacing; shape: as of `move_and_respace_line`.  Returns what
     `fill_redistributed` does: below 0 if all is well.  Theory R9.1.
     """
     is_spline, is_parallel, is_periodic, _, _ = shape
@@ -186,50 +207,50 @@ def respace_line(moved, spacing, relax, shape, walls, work):
 
 
 @kernel
-def carry_line(nodes, nodes_new, location, rim, dt, arrays, shaping, walls):
+def move_and_respace_line(nodes, nodes_new, location, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-    arrays: damping, velocities of the nodes beside the contact's [m/s] and moved nodes (2, n),
-    spacing (n,), scratch for another (n,), turning (n - 1,), scratch (8, n).  shaping: how far to
-    the spacing the nodes go, `relax` (not spread where it is 0, nor written below), and the shape:
-    whether the curve is a spline, whether nodes move parallel to their neighbours' chords, whether
-    it is periodic, whether it is closed, and the shortest segment that turning asks for (0: none,
-    as of `fill_turning_spacing`).  walls at both ends as in `fill_redistributed`.  Returns the
+    arrays: `LineArrays`.  shaping: `relax`, the part of the way to the spacing that nodes go (0:
+    they are not spread; ONLY_MOVED: nor written), and the shape: whether the curve is a spline,
+    whether nodes move parallel to their neighbours' chords, whether it is periodic, whether it is
+    closed, and the shortest segment that turning asks for [m] (0: none, as of
+    `fill_turning_spacing`).  walls at both ends as in `fill_redistributed`.  Returns the
     stretching, and what that returns: below 0 if all is well.  No node is spread faster than sound:
     in a step that a thin cell elsewhere makes very short, a part of the way would be a jump.
     """
-    damping, extra_velocity, moved, spacing, turned_spacing, turning, work = arrays
     relax, shape = shaping
     _, _, _, is_closed, shortest = shape
-    first_face = location[3]
+    moved = arrays.moved
+    first_face = location[FIRST_FACE]
     count = moved.shape[1]
     stretching = 0.0
     # the nodes with the flow (theory F6.2)
     if dt > 0.0:
-        stretching = move_line(nodes, nodes_new, location, rim, damping, dt, moved)
+        stretching = move_line(nodes, nodes_new, location, rim, arrays.damping, dt, moved)
         for c in range(2):
             for k in range(count):
-                extra_velocity[c, k] = damping[c, k]
+                arrays.extra_velocity[c, k] = arrays.damping[c, k]
     if relax < 0.0:
         return stretching, -1
     # a spacing that gives a bend the segments that it needs (theory R9.2)
     if shortest > 0.0 and relax > 0.0:
         curves.fill_turning_spacing(
-            moved, spacing, turning, is_closed, walls[0], walls[1], shortest, turned_spacing
-        )
+            moved, arrays.spacing, arrays.turning, is_closed, walls[0], walls[1], shortest,
+            arrays.turned_spacing,
+        )  # fmt: skip
     place_ends(nodes_new, location, moved)
     # nodes respaced along the line, no faster than sound
     failed = -1
     out = moved
     if relax > 0.0:
-        wanted = turned_spacing if shortest > 0.0 else spacing
-        failed = respace_line(moved, wanted, relax, shape, walls, work)
-        out = work[6:]
+        wanted = arrays.turned_spacing if shortest > 0.0 else arrays.spacing
+        failed = respace_line(moved, wanted, relax, shape, walls, arrays.scratch)
+        out = arrays.scratch[6:]
         if dt > 0.0:
             limit_spreading(moved, rim, first_face, dt, out)
             for c in range(2):
                 for k in range(1, count - 1):
-                    extra_velocity[c, k] += (out[c, k] - moved[c, k]) / dt
+                    arrays.extra_velocity[c, k] += (out[c, k] - moved[c, k]) / dt
     write_line(nodes_new, location, out)
     return stretching, failed
 
@@ -364,14 +385,15 @@ class Line:
         side = SIDE_NAMES.index(segment.side)
         count = line.shape[1]
         self.location = np.array([side, segment.start, count, segment.first, 0])
-        self._work = np.empty((8, count))
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
-        self._turned_spacing = self.spacing.copy()
-        self._turning = np.zeros(line.shape[1] - 1)
-        self.find_tied_displacement: Callable[[], np.ndarray] | None = (
-            None  # displacement of a carried seam
-        )
+        self._turning = np.zeros(count - 1)
+        self._arrays = LineArrays(
+            self.damping, self.extra_velocity, self.moved, self.spacing, self.spacing.copy(),
+            self._turning, np.empty((8, count)),
+        )  # fmt: skip
+        # where contacts move it, what gives the displacement of its nodes
+        self.find_tied_displacement: Callable[[], np.ndarray] | None = None
         self.role = Role.FLOWING if self.respaced else Role.WITH_ENDS
         self._is_shortened = False  # in this step, by a sliding contact
 
@@ -385,6 +407,7 @@ class Line:
     def set_spacing(self, spacing: np.ndarray) -> None:
         """Where the nodes are to be along the line from now on: (n + 1,) from 0 to 1."""
         self.spacing = np.ascontiguousarray(spacing)
+        self._arrays = self._arrays._replace(spacing=self.spacing)
 
     @property
     def may_lie_on_body(self) -> bool:
@@ -477,13 +500,9 @@ class Line:
             shape == "spline", shape == "parallel", self.period is not None, self.closed,
             self.shortest,
         )  # fmt: skip
-        arrays = (
-            self.damping, self.extra_velocity, self.moved, self.spacing, self._turned_spacing,
-            self._turning, self._work,
-        )  # fmt: skip
-        stretching, failed = carry_line.entry(
-            block.nodes, block.nodes_new, self.location, block.rim.rows, dt, arrays,
-            (relax, line_shape),            tuple(self.walls),
+        stretching, failed = move_and_respace_line.entry(
+            block.nodes, block.nodes_new, self.location, block.rim.rows, dt, self._arrays,
+            (relax, line_shape), tuple(self.walls),
         )  # fmt: skip
         if failed >= 0:
             raise curves.make_crossing(failed)
@@ -499,7 +518,7 @@ class FlowLine(Line):
     def move(self, step):
         self._is_shortened = False
         if self.role is Role.AT_CONTACT:
-            return self._move_and_respace(-1.0, self.rule.shape, step.dt)
+            return self._move_and_respace(ONLY_MOVED, self.rule.shape, step.dt)
         return self.settle(step.fraction, step.dt)
 
 
@@ -562,7 +581,7 @@ class TrackLine(StraightLine):
 
 
 class JoinedLine(Line):
-    """A line that nothing holds: it goes with its ends, or with the contacts that carry it."""
+    """A line that nothing holds: it goes with its ends, or with the contacts that move it."""
 
     def fill_moved(self, old, new, step):
         if self.find_tied_displacement is not None:

@@ -50,13 +50,13 @@ from shockgrid.regrid.equidistribution.volume_sweeps import (
 from shockgrid.regrid.equidistribution.weights import weigh_points
 from shockgrid.regrid.errors import BadInput, RegridFailure
 from shockgrid.regrid.hexahedra.faces import (
-    carry_faces,
     check_grids_in_space,
     compute_face_density,
     compute_volume,
     copy_faces,
     fill_from_faces,
     find_unit_in_space,
+    move_with_faces,
 )
 from shockgrid.regrid.jit import can_use_threads
 from shockgrid.regrid.measure.corners import compute_centres, compute_hexahedron_centres
@@ -385,7 +385,7 @@ class EquidistributionRegridder3D:
         sign = 1.0 if compute_volume(previous) >= 0.0 else -1.0
         nodes = np.empty_like(previous)
         start = "displacement"
-        carry_faces(previous, boundary, nodes)
+        move_with_faces(previous, boundary, nodes)
         if not is_valid(nodes, sign):
             copy_faces(boundary, nodes)
             nodes = interpolate_faces(nodes)

@@ -321,7 +321,7 @@ def fill_from_faces(nodes: np.ndarray, spacings: Sequence[np.ndarray]) -> None:
     fill_blended(nodes, *spacings, np.empty((3, nodes.shape[3])))
 
 
-def carry_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> None:
+def move_with_faces(previous: np.ndarray, boundary: np.ndarray, out: np.ndarray) -> None:
     """Fill `out` with the grid `previous` moved along with the faces of `boundary` (R14.8)."""
     old_faces = gather_faces(previous)
     displacement = gather_faces(boundary) - old_faces

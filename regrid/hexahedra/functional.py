@@ -42,6 +42,9 @@ EDGE, INVERSE, STRAIGHT, SQUARE, OTHER_EDGE = (k * HEXAHEDRON_SPAN for k in (0, 
 VOLUME_ROW = 72 * HEXAHEDRON_SPAN
 OTHER_VOLUME = 80 * HEXAHEDRON_SPAN
 WEIGHT, SUM, LEAST = (k * HEXAHEDRON_SPAN for k in (88, 89, 90))  # of cells
+# where corners of two grids are compared
+LEAST_VOLUME = SUM
+LEAST_RATIO_ROW = LEAST
 FLUX_ROW = 91 * HEXAHEDRON_SPAN  # of the eight edges, summed over corners
 HIGH_ROW = 115 * HEXAHEDRON_SPAN  # of those along i and j, from the cells before them
 # of cells: for the edge along i; summed over all three
@@ -633,8 +636,9 @@ def compare_corners(nodes, old, inverse, shape, Z):
     """
     n1, n2, n = shape
     padded = round_up(n)
+    to_old = OTHER_VOLUME - VOLUME_ROW  # from a row of new volumes to that of old ones
     for k in range(padded):
-        Z[LEAST + k] = Z[SUM + k] = math.inf
+        Z[LEAST_RATIO_ROW + k] = Z[LEAST_VOLUME + k] = math.inf
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
@@ -643,23 +647,23 @@ def compare_corners(nodes, old, inverse, shape, Z):
             fill_volumes(Z, padded, OTHER_GRID_OFFSET, OTHER_VOLUME)
             for row in range(VOLUME_ROW, OTHER_VOLUME, HEXAHEDRON_SPAN):
                 for k in range(padded):
-                    old_volume = Z[row + OTHER_VOLUME - VOLUME_ROW + k]
-                    Z[row + OTHER_VOLUME - VOLUME_ROW + k] = old_volume if old_volume > 0.0 else 1.0
+                    old_volume = Z[row + to_old + k]
+                    Z[row + to_old + k] = old_volume if old_volume > 0.0 else 1.0
                 for k in range(padded):
                     # not min(), which would lose a NaN
                     new_volume = Z[row + k]
-                    least_ratio = Z[LEAST + k]
-                    least_volume = Z[SUM + k]
-                    corner_ratio = new_volume / Z[row + OTHER_VOLUME - VOLUME_ROW + k]
-                    Z[LEAST + k] = least_ratio if least_ratio <= corner_ratio else corner_ratio
-                    Z[SUM + k] = least_volume if least_volume <= new_volume else new_volume
+                    least_ratio = Z[LEAST_RATIO_ROW + k]
+                    least_volume = Z[LEAST_VOLUME + k]
+                    ratio = new_volume / Z[row + to_old + k]
+                    Z[LEAST_RATIO_ROW + k] = least_ratio if least_ratio <= ratio else ratio
+                    Z[LEAST_VOLUME + k] = least_volume if least_volume <= new_volume else new_volume
     least_ratio = math.inf
     least_volume = math.inf
     for k in range(n):
-        if not Z[LEAST + k] >= least_ratio:
-            least_ratio = Z[LEAST + k]
-        if not Z[SUM + k] >= least_volume:
-            least_volume = Z[SUM + k]
+        if not Z[LEAST_RATIO_ROW + k] >= least_ratio:
+            least_ratio = Z[LEAST_RATIO_ROW + k]
+        if not Z[LEAST_VOLUME + k] >= least_volume:
+            least_volume = Z[LEAST_VOLUME + k]
     return least_ratio, least_volume
 
 

@@ -20,7 +20,6 @@ import numpy as np
 from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.hexahedra.faces import (
     Functional,
-    carry_faces,
     check_grids_in_space,
     compute_edge_spacings,
     compute_face_lengths,
@@ -31,6 +30,7 @@ from shockgrid.regrid.hexahedra.faces import (
     fill_from_faces,
     find_turned_edge,
     find_unit_in_space,
+    move_with_faces,
 )
 from shockgrid.regrid.hexahedra.functional import (
     HEXAHEDRON_ROWS,
@@ -184,7 +184,7 @@ class HexahedraMove(Workspace):
         taken.  True if `trial` is valid.
         """
         self.lengths = compute_face_lengths(self.faces, self.weights, self.options.conditional)
-        carry_faces(self.old, self.faces, self.base)
+        move_with_faces(self.old, self.faces, self.base)
         displaced = self.base.copy()
         interpolated = np.empty_like(self.faces)
         copy_faces(self.faces, interpolated)
@@ -228,7 +228,7 @@ class HexahedraMove(Workspace):
         self.lengths = compute_face_lengths(self.faces, self.weights, options.conditional)
         if not np.isfinite(self.lengths.scale) or not self.lengths.scale > 0.0:
             return False
-        carry_faces(self.old, self.faces, self.base)
+        move_with_faces(self.old, self.faces, self.base)
         displaced_ratio, least_volume = self._compare(self.base)
         if self.inner == 0:
             self.trial[:] = self.base

@@ -17,6 +17,8 @@ it has a sixtieth of the fine one's size.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from shockgrid.regrid.barrier import functional
@@ -501,7 +503,30 @@ solve_coarse = make_solver(False, multiply_coarse, advance_coarse)
 NO_FLOOR = 0.0
 
 
-def solve(matrix, vectors, tolerance: float, most_iterations: int) -> int:
+class SolverArrays(NamedTuple):
+    """What the solver of a coarse matrix needs besides the vectors.
+
+    All columns are one chunk: `columns`, its first one and the end; `totals` (n_j + 1,) of columns,
+    zero but in the first one; `scratch` that is not used.
+    """
+
+    columns: np.ndarray
+    totals: np.ndarray
+    scratch: np.ndarray
+
+
+def make_solver_arrays(nodes_j: int) -> SolverArrays:
+    """`SolverArrays` for so many coarse nodes along j."""
+    return SolverArrays(np.array([1, nodes_j - 1]), np.zeros(nodes_j), np.zeros((1, 1)))
+
+
+def solve(
+    matrix: np.ndarray,
+    vectors: np.ndarray,
+    arrays: SolverArrays,
+    tolerance: float,
+    most_iterations: int,
+) -> int:
     """Improve the solution x of a factored matrix for a right side.
 
     `matrix`: (n_i + 1, COARSE_ROWS, n_j + 1); `vectors` (6, 2, n_i + 1, n_j + 1): the right side,
@@ -510,15 +535,11 @@ def solve(matrix, vectors, tolerance: float, most_iterations: int) -> int:
     `most_iterations`; returns their number, or -1 where the matrix is not positive definite.
     """
     r, x, z, p, p_old, product = vectors
-    # one chunk of all columns, whose sums stay zero but in the first one
-    columns = np.array([1, x.shape[2] - 1])
-    totals = np.zeros(x.shape[2])
-    scratch = np.zeros((1, 1))
     # residual of the first x
     fill_product.entry(matrix, x, product)
     r -= product
     iterations, first_square, _, positive = solve_coarse.entry(
-        columns, matrix[np.newaxis], (x, r, z), (p, p_old, product), totals,
-        (tolerance, NO_FLOOR, most_iterations), scratch,
+        arrays.columns, matrix[np.newaxis], (x, r, z), (p, p_old, product), arrays.totals,
+        (tolerance, NO_FLOOR, most_iterations), arrays.scratch,
     )  # fmt: skip
     return iterations if first_square >= 0.0 and positive else -1

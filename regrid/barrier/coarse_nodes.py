@@ -23,6 +23,7 @@ from shockgrid.regrid.barrier.coarse_matrix import (
     COARSE_ROWS,
     factor_lines,
     fill_coarse_matrix,
+    make_solver_arrays,
     solve,
 )
 from shockgrid.regrid.jit import kernel
@@ -204,6 +205,7 @@ class Level:
         self.starts_j = cut_evenly(nj, parts_j)
         nodes_j = self.starts_j.size
         self.shapes = (nodes_i, COARSE_ROWS, nodes_j), (6, 2, nodes_i, nodes_j)
+        self.solver_arrays = make_solver_arrays(nodes_j)
 
     def take_arrays(self, memory: np.ndarray) -> None:
         """Place matrix and vectors at the start of `memory` (n,)."""
@@ -274,8 +276,9 @@ class CoarseCorrection:
             # solved
             factor_lines.entry(level.matrix)
             iterations = solve(
-                level.matrix, level.vectors, tuning.exact_tolerance, tuning.max_iterations
-            )
+                level.matrix, level.vectors, level.solver_arrays, tuning.exact_tolerance,
+                tuning.max_iterations,
+            )  # fmt: skip
             if iterations < 0:
                 return 0.0
             self.iterations += iterations

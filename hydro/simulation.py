@@ -20,6 +20,7 @@ from shockgrid.hydro.history import compute_columns
 from shockgrid.hydro.ledger import Ledger
 from shockgrid.hydro.links import Exchange, Link, name_materials
 from shockgrid.hydro.mixture.phases import check_geometry
+from shockgrid.hydro.motion.following import ZoneFollowing
 from shockgrid.hydro.motion.grid_motion import GridMotion, MeshMotion
 from shockgrid.hydro.motion.line import Line, LineRule
 from shockgrid.hydro.motion.overlaps import Overlaps
@@ -87,6 +88,7 @@ class Joining(Protocol):
     first_nodes: np.ndarray | None
     name: str
     joined: Mapping[str, str]  # labels of materials that become one, and its label
+    following: ZoneFollowing | None  # spaces the sides of the new block
 
     def is_due(self, t: float) -> bool:
         """Whether it is time [s] for it, and it has not been done yet."""
@@ -317,6 +319,8 @@ class Simulation:
             clock.tension_dt = self.tension.find_step()
         while True:
             try:
+                if self._line_rule.following is not None:
+                    self._line_rule.following.look(self._shared)
                 self._check_collapse()
                 touching = self.meetings.find(clock.t, clock.step)
                 self._overlaps.check(clock.t, clock.step, touching)
@@ -428,7 +432,8 @@ class Simulation:
         self, blocks: list[Block], links: list, make_regridder: Callable[[], object]
     ) -> None:
         """March these blocks from now on."""
-        self._line_rule = replace(self._line_rule, respacing=None)
+        following = None if self.handover is None else self.handover.following
+        self._line_rule = replace(self._line_rule, respacing=None, following=following)
         self._connect(blocks, links, make_regridder)
         ledger = self.ledger
         self.ledger = Ledger(blocks, self._joined)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shockgrid.hydro.boundary import NodeMotion, Segment
+from shockgrid.hydro.motion.following import ZoneFollowing
 from shockgrid.hydro.motion.track import Track
 from shockgrid.hydro.rim import NX, NY, U_STAR, C
 from shockgrid.regrid import curves
@@ -312,13 +313,14 @@ class LineRule:
     `shape` of the line between nodes when they are re-spaced, "chord" or "spline"; `relax`: part
     of the way to the spacing in a full step; `thickness` [m] of interfaces, see
     `hydro.motion.smoothing`, None: its THICK_CELLS of their first cells; `respacing` of straight
-    sides and of seams.
+    sides and of seams; `following`: spaces straight sides anew in each step.
     """
 
     shape: str = "spline"
     relax: float = 0.05
     thickness: float | None = None
     respacing: Respacing | None = None
+    following: ZoneFollowing | None = None
 
 
 class Role(Enum):

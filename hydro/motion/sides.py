@@ -50,6 +50,7 @@ class StraightSides:
         self.locations = np.array([line.location for line in lines])
         counts = [line.spacing.size for line in lines]
         self.locations[:, -1] = np.cumsum(counts) - counts
+        self.following = lines[0].rule.following
         self.respacing = None
         if any(line.last_spacing is not None for line in lines):
             self.respacing = lines[0].rule.respacing
@@ -63,6 +64,8 @@ class StraightSides:
         ):
             self.share = share
             self.spacings = np.concatenate([line.find_spacing(t) for line in self.lines])
+        if self.following is not None:
+            self.spacings = self.following.respace(self.block, self.lines)
         spread_straight(self.block.nodes_new, self.locations, self.spacings)
 
     @classmethod

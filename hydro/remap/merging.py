@@ -16,6 +16,7 @@ import numpy as np
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.eos.conversion import compute_conserved
 from shockgrid.hydro.eos.mixture import Mixture
+from shockgrid.hydro.motion.following import ZoneFollowing
 from shockgrid.hydro.remap.conserved import limit_slopes_to_states
 from shockgrid.hydro.remap.overlay import compute_cell_moments, make_linear_fields, overlay_grids
 from shockgrid.hydro.rows import HELD_ARRAYS, RHO
@@ -98,8 +99,9 @@ class Handover:
     time: from which on [s], None: when the flow cannot go on otherwise; eos: of both materials;
     make_nodes: gives the grid (2, ni+1, nj+1) for all blocks; assemble: makes the new block with
     its sides and what makes its regridder; name: of the block; joined: labels of materials that
-    become one, and its label.  Blocks of the first material are
-    those with the material of the first block, or with its equation of state where the two differ.
+    become one, and its label; following: spaces the sides of the new block.  Blocks of the first
+    material are those with the material of the first block, or with its equation of state where
+    the two differ.
     """
 
     def __init__(
@@ -110,6 +112,7 @@ class Handover:
         assemble: Assemble,
         name: str,
         joined: Mapping[str, str] | None = None,
+        following: ZoneFollowing | None = None,
     ):
         self.time = time
         self.eos = eos
@@ -117,6 +120,7 @@ class Handover:
         self.assemble = assemble
         self.name = name
         self.joined = joined or {}
+        self.following = following
         self.first_nodes: np.ndarray | None = None  # of the new block, when it is there
 
     def is_due(self, t: float) -> bool:

@@ -21,6 +21,7 @@ from shockgrid.hydro.boundary import put
 from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture, mix
 from shockgrid.hydro.links import Link, join
 from shockgrid.hydro.mixture.phases import make_fraction_fields
+from shockgrid.hydro.motion.following import Sizes, ZoneFollowing
 from shockgrid.hydro.motion.line import LineRule, Respacing
 from shockgrid.hydro.motion.smoothing import THICK_CELLS
 from shockgrid.hydro.rows import V
@@ -234,7 +235,19 @@ class InterfaceInstability(Results, Problem):
 
         kct = self.deck.handover_kct
         time = None if kct is None or self.is_captured else self.arrival + kct / self._rate
-        return Handover(time, self.mixture, self._make_zone_nodes, self._assemble_zone, ZONE_BLOCK)
+        following = None
+        if not self.is_captured:
+            usual = self.deck.wavelength / self.deck.cells
+            sizes = Sizes(usual / self.zone_refinement, usual, self.deck.stretch)
+            following = ZoneFollowing(sizes)
+        return Handover(
+            time,
+            self.mixture,
+            self._make_zone_nodes,
+            self._assemble_zone,
+            ZONE_BLOCK,
+            following=following,
+        )
 
     def _make_zone_nodes(self, blocks: Sequence[Block]) -> np.ndarray:
         first, second = blocks

@@ -1,109 +1,53 @@
-"""What a run costs: before it starts, how long it still takes, and that its steps become short.
-
-docs/cost.md says how; past_runs.json, beside this file, is written by `python
-benchmarks/forecast_table.py past`.
+"""What a run costs: memory and disk before it starts, the time left, and that its steps become
+short.  docs/cost.md says how.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from shockgrid.problems.memory import estimate_memory
 from shockgrid.problems.problem import Problem, plan_blocks
 from shockgrid.regrid.errors import BadInput
-from shockgrid.runs.deck.checking import find_changes
 from shockgrid.runs.deck.reading import ReadDeck
 from shockgrid.runs.early_end.causes import SHORT_STEPS, describe_settings
 from shockgrid.runs.inspection.account import OWN_REASONS
-from shockgrid.runs.quantities import count, describe_bytes, describe_seconds
+from shockgrid.runs.quantities import count, describe_bytes
 from shockgrid.runs.store.directory import KEPT_RESTARTS
 
 DUMP_BYTES = 64  # a cell in a dump: nodes, five fields and a rate
 BLOCK_BYTES = 30_000  # of a block in a dump, for the form of the file; measured
 ROW_BYTES = 600  # of a step in history.csv; measured
-# steps over those foretold, at the least and most: from a run to this time, or to another
-SAME = (0.75, 1.5)
-LIKE = (0.5, 5.0)
 TIGHT_DISK_PART = 0.9  # part of the free disk that a run may be foretold to fill without a word
-
-PAST_RUNS = Path(__file__).with_name("past_runs.json")
-SURE_TIME_FACTOR = 1.6  # a step's wall time may be so many times that of a past run, or less
-UNSURE_CELL_POWER = 0.25  # power of the ratio of cells by which that grows
-WORK_CELL_POWER = 0.8  # power of the number of cells with which a step's wall time grows
-WIDEST_TIME_RANGE = 50.0  # of the longest time over the shortest: beyond, nothing is foretold
-OTHER = ("run", "output", "gauge", "cells")  # keys of a deck that leave the flow as it is
 
 FIRST_STEPS = 12  # until there is a word: the first five are shortened on purpose
 MARK_GROWTH = 1.03  # of the steps from mark to mark: a few hundred marks for any run
 STEEPEST_LOG_CHANGE = 4.0  # change of a logarithm, at most, that is foretold from a fit alone
 UNUSUAL_STEP_FACTOR = 4.0  # times the usual wall time of a step: no speed, but an event
-PARTS = np.linspace(0.0, 1.0, 21)  # of the end time of a past run
 # what was left over what was foretold, at its least and most, at the very start of runs
-FITTED = (0.8, 3.0)
-REMEMBERED = (0.65, 1.8)
+LEAST_LEFT_FACTOR = 0.8
+MOST_LEFT_FACTOR = 3.0
 
 FALLEN_STEP_FACTOR = 100.0  # times below its largest value: dt is worth a word
 
 
-class PastRun(msgspec.Struct, frozen=True):
-    """One run: its flow and how it went.
-
-    finest: the least width [m] of a block over its cells; first_dt: the first stable step [s];
-    course: the share of its wall time that was over at PARTS of t_end; seconds: wall time [s] of a
-    step, with nothing else on the machine.
-    """
-
-    flow: str
-    cells: int
-    t_end: float
-    finest: float
-    first_dt: float
-    steps: int
-    course: tuple[float, ...]
-    seconds: float
-
-    def is_off(self, cells: int) -> float:
-        """How far the number of cells is from another, as the size of a logarithm."""
-        return abs(math.log(self.cells / max(cells, 1)))
-
-
 @dataclass(frozen=True)
 class Size:
-    """Cells of all blocks, which are named with their cells both ways, their least width [m], the
-    end [s], and bytes of memory and of a dump."""
+    """Cells of all blocks, which are named with their cells both ways, the end [s], and bytes of
+    memory and of a dump."""
 
     cells: int
     blocks: tuple[tuple[str, tuple[int, ...]], ...]
-    finest: float
     t_end: float
     memory: float
     dump: float
-
-
-def name_flow(problem: str, deck: Any) -> str:
-    """The problem and those keys of its deck that make it another flow than by default."""
-    try:
-        usual = msgspec.to_builtins(type(deck)())
-    except (BadInput, TypeError):
-        usual = {}
-    changes = [one for one in find_changes(usual, msgspec.to_builtins(deck))
-               if one.key.partition(".")[0] not in OTHER]  # fmt: skip
-    return "; ".join([problem, *sorted(f"{one.key}={one.now}" for one in changes)])
-
-
-@functools.cache
-def read_past() -> list[PastRun]:
-    """The runs that come with shockgrid."""
-    return msgspec.json.decode(PAST_RUNS.read_bytes(), type=list[PastRun])
 
 
 def drop_events(seconds: np.ndarray) -> np.ndarray:
@@ -111,12 +55,6 @@ def drop_events(seconds: np.ndarray) -> np.ndarray:
     they are first needed, another program on the machine."""
     usual = float(np.median(seconds))
     return np.where(seconds <= UNUSUAL_STEP_FACTOR * usual, seconds, usual)
-
-
-def find_past(flow: str, cells: int) -> PastRun | None:
-    """The past run of a flow with cells nearest in number; None where there is none."""
-    same = (run for run in read_past() if run.flow == flow)
-    return min(same, key=lambda run: run.is_off(cells), default=None)
 
 
 def measure_size(problem: Problem, evolution: Any = None) -> Size:
@@ -128,28 +66,10 @@ def measure_size(problem: Problem, evolution: Any = None) -> Size:
         plan = evolution.t_end, plan_blocks({b.name: b.nodes for b in evolution.blocks})
     t_end, planned = plan
     sizes = [math.prod(block.cells) for block in planned]
-    widths = np.ravel([np.subtract(b.high, b.low) / b.cells for b in planned])
-    finest = float(np.min(widths[widths > 0.0], initial=math.inf))
     named = tuple((block.name, tuple(block.cells)) for block in planned)
     dump = float(DUMP_BYTES * sum(sizes) + BLOCK_BYTES * len(planned))
     memory = estimate_memory(sum(sizes), sizes) + problem.estimate_solver_memory(sum(sizes))
-    return Size(sum(sizes), named, finest, float(t_end), memory, dump)
-
-
-def foretell_steps(
-    size: Size, past: PastRun | None, first_dt: float | None, most: int | None = None
-) -> tuple[float, float, float] | None:
-    """Steps of a run, `most` at most: the least, the likely, the most; None without a past run.
-
-    first_dt: the first stable step [s], None where nothing is built.
-    """
-    if past is None or not 0.0 < size.t_end < math.inf:
-        return None
-    steps = past.steps * size.t_end / past.t_end
-    steps *= past.first_dt / first_dt if first_dt else past.finest / size.finest
-    low, high = SAME if 0.95 < size.t_end / past.t_end < 1.05 else LIKE
-    low, likely, high = (min(factor * steps, most or math.inf) for factor in (low, 1.0, high))
-    return low, likely, high
+    return Size(sum(sizes), named, float(t_end), memory, dump)
 
 
 def foretell(
@@ -163,22 +83,7 @@ def foretell(
     """
     with read.numbers_in_reach():
         size = measure_size(problem, evolution)
-    clock = getattr(evolution, "clock", None)
     wanted = read.deck.output
-    past = find_past(name_flow(read.problem, read.deck), size.cells)
-    first_dt = None if clock is None else clock.first_stable_dt
-    steps = foretell_steps(size, past, first_dt, read.deck.run.max_steps)
-    forecast = "steps and time are unknown before the start: no similar run is known"
-    if past is not None and steps is not None:
-        low, likely, high = (max(round(float(f"{number:.2g}")), 1) for number in steps)
-        forecast = f"about {likely}{f' ({low} to {high})' * (low < high)} steps; "
-        sure = SURE_TIME_FACTOR * math.exp(UNSURE_CELL_POWER * past.is_off(size.cells))
-        if steps[2] / steps[0] * sure**2 > WIDEST_TIME_RANGE:
-            forecast += "the time of a step is measured in the run"
-        else:
-            a_step = past.seconds * (max(size.cells, 1) / past.cells) ** WORK_CELL_POWER
-            seconds = describe_seconds(steps[0] * a_step / sure, steps[2] * a_step * sure)
-            forecast += f"time stepping will take {seconds} on a desktop computer"
     cells = f"{size.cells} cells in {count(len(size.blocks), 'block')}"
     if getattr(read.deck, "refine", False):
         cells += " initially, more where the interface needs them later (refine)"
@@ -187,7 +92,7 @@ def foretell(
         between = size.t_end // wanted.every if math.isfinite(size.t_end) else 0
     dumps = 2 + between + len(wanted.times)
     restarts = KEPT_RESTARTS + 1 if wanted.restart_every else 0
-    disk = (dumps + restarts) * size.dump + ROW_BYTES * (steps[1] if steps else 0.0)
+    disk = (dumps + restarts) * size.dump
     folder = Path(output or "out")
     free = find_free(folder)
     a_dump, needed, there = map(describe_bytes, (size.dump, disk, free))
@@ -199,9 +104,10 @@ def foretell(
     if free < 2.0 * size.dump and evolution is not None:
         raise BadInput(shortage)
     return [
-        f"cost: {cells}; {forecast}",
-        f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} "
-        f"({count(round(dumps), 'dump')} of {a_dump}{f', {there} free' * math.isfinite(free)})",
+        f"cost: {cells}; the time left is said from the third second of a run on",
+        f"cost: memory about {describe_bytes(size.memory)}; disk about {needed} and "
+        f"{ROW_BYTES} B per step ({count(round(dumps), 'dump')} of {a_dump}"
+        f"{f', {there} free' * math.isfinite(free)})",
     ], [f"caution: {shortage}"] * (disk > TIGHT_DISK_PART * free)
 
 
@@ -216,11 +122,10 @@ def find_free(folder: Path) -> float:
 
 
 class TimeLeft:
-    """Marks of a run, and what they foretell; course: of a past run of this deck, if any."""
+    """Marks of a run, and the wall time that they foretell."""
 
-    def __init__(self, t_end: float, course: Sequence[float] = ()):
+    def __init__(self, t_end: float):
         self.t_end = t_end
-        self.course = course
         self.marks: list[tuple[float, float, float]] = []  # step, t, wall time
         self._next = 0.0
 
@@ -245,32 +150,21 @@ class TimeLeft:
         each = drop_events(np.diff(walls) / counts)
         half = slice(max(int(np.searchsorted(steps, steps.mean())) - 1, 0), None)
         a_step = np.average(each[half], weights=counts[half])
-        end = self.t_end
-        limits = FITTED
-        if self.course:  # a run may end before its end time
-            end *= PARTS[np.searchsorted(self.course, 1.0)]
         # the trend of steps a second of the flow, believed in for about as long as it was seen
         middles = 0.5 * (times[1:] + times[:-1])[half] - t
         memory = t - times[half][0]
         rates = np.log(counts / flow)[half]
         weights = np.sqrt(counts[half])
         slope, level = np.polyfit(middles, rates, 1, w=weights)
-        ahead = np.linspace(0.0, max(end - t, 0.0), 200)
+        ahead = np.linspace(0.0, max(self.t_end - t, 0.0), 200)
         trend = np.clip(
             slope * memory * (1.0 - np.exp(-ahead / memory)),
             -STEEPEST_LOG_CHANGE,
             STEEPEST_LOG_CHANGE,
         )
         left = float(np.trapezoid(np.exp(level + trend), ahead)) * a_step
-        if self.course:
-            first, now = np.interp([times[0] / self.t_end, t / self.t_end], PARTS, self.course)
-            spent = each @ counts
-            known = spent * (1.0 - now) / max(now - first, 1e-9)
-            share = spent / (spent + known)
-            limits = REMEMBERED
-            left = left**share * known ** (1.0 - share)
         unknown = math.sqrt(max(1.0 - t / self.t_end, 0.0))
-        return tuple(float(left * x**unknown) for x in (limits[0], 1.0, limits[1]))
+        return left * LEAST_LEFT_FACTOR**unknown, left, left * MOST_LEFT_FACTOR**unknown
 
 
 class ShortSteps:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -18,7 +17,7 @@ from shockgrid.regrid.jit import can_use_threads
 from shockgrid.regrid.text_files import escape_controls
 from shockgrid.runs.deck.reading import ReadDeck
 from shockgrid.runs.early_end.causes import name_failure
-from shockgrid.runs.forecast import ShortSteps, TimeLeft, find_past, measure_size, name_flow
+from shockgrid.runs.forecast import ShortSteps, TimeLeft, measure_size
 from shockgrid.runs.gauges import NO_BLOCK
 from shockgrid.runs.inspection.account import count_cells, judge
 from shockgrid.runs.quantities import count, describe_seconds, describe_time, drop_units
@@ -143,7 +142,6 @@ class Outlook:
         self.problem = problem
         self.evolution = evolution
         self.directory = directory
-        self.flow = name_flow(deck.problem, deck.deck)
         self.size = measure_size(problem, evolution)
         self.trend = ShortSteps(evolution, self.tell)
         self.say = say
@@ -154,12 +152,6 @@ class Outlook:
         line = drop_units(line, self.problem.t_unit)
         self.directory.note(line)
         self.say(line)
-
-    def find_course(self) -> tuple[float, ...]:
-        """How the wall time of a past run of the same flow went; () where there was none."""
-        past = find_past(self.flow, self.size.cells)
-        t_end = self.evolution.t_end
-        return past.course if past is not None and math.isclose(past.t_end, t_end) else ()
 
     def fail(self, error: Exception) -> None:
         """The verdict on a run that has failed; nothing may hide its own sentence."""

@@ -296,7 +296,6 @@ class Runner:
         self.outlook = Outlook(
             self.deck, self.problem, self.evolution, self.directory, self.progress.say
         )
-        self.progress.left.course = self.outlook.find_course()
         try:
             with self._signals_caught(), self.writing.running(), compiling(self.quiet):
                 reason = self._march()

@@ -154,7 +154,7 @@ def make_image(
             made.attrs.update(find_provenance(names.deck_text))
         file.flush()
         image = file.id.get_file_image()
-    if linked is None:
+    if linked is None or len(image) > MOST_KEPT_BYTES:
         return image
     while kept:
         kept.popitem()[1][0].close()
@@ -175,6 +175,7 @@ class _Kept(threading.local):
 
 
 _kept = _Kept()
+MOST_KEPT_BYTES = 8_000_000  # of a dump: where HDF5's own time is next to nothing, memory is not
 WRITABLE_IMAGE = 1  # H5LT_FILE_IMAGE_OPEN_RW
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from shockgrid.regrid.errors import BadInput, RegridFailure, RunFailure
 from shockgrid.runs.early_end.causes import name_failure
-from shockgrid.runs.forecast import PARTS, ShortSteps, TimeLeft
+from shockgrid.runs.forecast import ShortSteps, TimeLeft
 from shockgrid.runs.inspection.account import RULES, describe_verdict, judge
 
 
@@ -48,9 +48,9 @@ def march(step_of, t_end=1.0, seconds=lambda t: 0.01):
     return rows
 
 
-def foretell(rows, share, course=(), t_end=1.0):
+def foretell(rows, share, t_end=1.0):
     """The forecast at this share of the wall time, and what came true."""
-    left = TimeLeft(t_end, course)
+    left = TimeLeft(t_end)
     for step, t, wall in rows:
         left.note(step, t, wall)
         if wall >= share * rows[-1][2]:
@@ -74,15 +74,6 @@ def test_a_falling_dt_is_followed(fall):
     assert 0.67 < likely / real < 1.5
     assert abs(np.log(likely / real)) < abs(np.log(naive / real))
     assert low <= real <= high
-
-
-def test_a_run_that_ends_before_its_end_time_is_expected_to_do_so_again():
-    rows = march(lambda t: 1e-3, t_end=0.6)
-    _, times, walls = np.array([(0, 0.0, 0.0), *rows]).T
-    course = tuple(np.interp(PARTS, times, walls / walls[-1]))
-    assert course[12:] == (1.0,) * 9
-    (_, likely, _), real = foretell(rows, 0.25, course)
-    assert likely == pytest.approx(real, rel=0.02)
 
 
 STEPS = 200

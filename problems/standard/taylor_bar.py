@@ -13,7 +13,9 @@ plastic strain.  A deck may bring what was measured or computed elsewhere, as `k
 fits measured bars of aluminium, copper and steel within some hundredths; Y is the flow stress of
 the law at a strain of a tenth and a rate of 1e4 1/s.
 
-Note: the foot stays on the wall.  Real bars rebound, and the rim of the foot lifts a little.
+Note: the foot stays on the wall.  Real bars rebound, and the rim of the foot lifts a little.  The
+run of a bar far too soft for its speed ends when the foot is a sheet, four times as wide as the
+bar.
 """
 
 import math
@@ -42,6 +44,7 @@ from shockgrid.regrid.errors import BadInput
 
 USUAL_STRAIN = 0.1
 USUAL_RATE = 1e4  # [1/s]
+SPLASH_WIDTH = 4.0  # of the foot over the bar; bars that come to rest have up to 3
 LENGTH_LEFT_PART = 0.12  # of the estimate
 ONE_MILLIMETRE = 1e-3
 DRAWN_PARTS = (0.125, 0.375, 1.0)  # of the run
@@ -118,7 +121,14 @@ class TaylorBar(Problem):
         for side in ("i_max", "j_max"):
             put(block, side, "free-surface")
         put_walls(block, curved=True)
-        return self.simulate([block], geometry="axisymmetric")
+        return self.simulate([block], geometry="axisymmetric", find_end=self.find_splash)
+
+    def find_splash(self, flow) -> str | None:
+        """A sentence once the foot is a sheet, which no strength stops; else None."""
+        width = 2.0 * float(flow.blocks[0].nodes[1, 0].max()) / self.deck.diameter
+        if width < SPLASH_WIDTH:
+            return None
+        return f"the foot is {width:.3g} times as wide as the bar, a sheet that runs along the wall"
 
     def measure(self, evolution) -> dict[str, float]:
         """Length and foot [m], kinetic energy of the whole bar [J], greatest plastic strain."""

@@ -128,6 +128,16 @@ def test_bar_comes_to_rest_and_has_a_wide_foot():
     assert rows["foot_diameter"].computed > 1.8 * 6.4e-3
 
 
+def test_a_bar_too_soft_for_its_speed_ends_as_a_sheet():
+    law = "law = 'perfect', shear_modulus = 11e9, yield_strength = 5e7"
+    settings = "material=Al1100", "speed=500", "cells=3", f"strength={{ {law} }}"
+    problem = read_deck("taylor-bar", settings).make_problem()
+    flow = problem.build()
+    march_measured(problem, flow)
+    assert "a sheet that runs along the wall" in flow.finished
+    assert flow.t < problem.t_end
+
+
 @pytest.mark.parametrize("yield_stress", [0.1e9, pytest.param(0.4e9, marks=pytest.mark.slow)])
 def test_ripple_stops_at_a_height_as_the_inverse_of_the_flow_stress(yield_stress):
     law = f"law = 'perfect', shear_modulus = 47.7e9, yield_strength = {yield_stress}"

@@ -37,7 +37,8 @@ from shockgrid.regrid.errors import BadInput, Place, RunFailure, suggest
 from shockgrid.regrid.sides import SIDE_NAMES
 
 LEAST_STEP_PART = 1e-9  # of the first stable step: a shorter one will not bring the run to its end
-# the same where the flow can go on without the line that makes the steps short
+# the same where the flow can go on without the line that makes the steps short, times the part of
+# the run that is left: what is left would take fifty times as many steps as all did at first
 LEAST_STEP_PART_BEFORE_HANDOVER = 0.02
 COLLAPSING_STEP_PART = 1e-4  # the same: so short steps show that a grid cannot follow
 # why two blocks became one, in the history: at a given time; else the cause of a failure
@@ -464,7 +465,10 @@ class Simulation:
         clock = self.clock
         dt, dt_limit = clock.choose_dt()
         can_hand_over = self.handover is not None and self.handover.first_nodes is None
-        least_part = LEAST_STEP_PART_BEFORE_HANDOVER if can_hand_over else LEAST_STEP_PART
+        least_part = LEAST_STEP_PART
+        if can_hand_over:
+            part_left = (clock.t_end - clock.t) / clock.t_end
+            least_part = max(least_part, LEAST_STEP_PART_BEFORE_HANDOVER * part_left)
         if dt >= least_part * clock.first_stable_dt or dt_limit in ("t_end", "start"):
             return
         when = f"t = {clock.t:.6g} s (step {clock.step})"

@@ -221,6 +221,5 @@ def test_an_elastic_surface_grows_at_the_rate_of_theory():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("drive", [2.3, 10.0])
-def test_an_elastic_surface_near_the_limit_and_far_above_it_grows_at_the_rate_of_theory(drive):
-    assert run("elastic-waves-growth", f"drive={drive}", "cells=64")["rate"].find_error() < 0.02
+def test_an_elastic_surface_far_above_the_limit_grows_at_the_rate_of_theory():
+    assert run("elastic-waves-growth", "drive=10", "cells=64")["rate"].find_error() < 0.02

@@ -18,6 +18,8 @@ from shockgrid.regrid.jit import compiled_once, kernel
 
 # of a face's length: so far the leader's nodes may lie behind the follower's chords
 DEEP_NODE_PART = 0.05
+# the same within a face whose nodes do not lie on the leader's line, so that it is no chord of it
+LEFT_NODE_PART = 2e-3
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 # of a face's length: nodes of both lines that lie so near each other are a pair
 MATCHED_NODE_DISTANCE = 1e-6
@@ -110,18 +112,18 @@ def measure_shorter(points, k):
 
 
 @compiled_once
-def is_laid(k, pins, away, length, back, at_end, ends_line):
+def is_laid(k, pins, away, length, back, at_end, ends_line, on_chord):
     """Whether a node is laid on the other line; see `lay`.
 
     away: how far its place is outside it, and beside its foot [m]; length: of the face there, or of
     the shorter one of its own if that is less;
-    at_end: whether it is an end of its own line; ends_line: whether its foot is one of the other's.
+    at_end: whether it is an end of its own line; ends_line: whether its foot is one of the other's;
+    on_chord: whether both nodes of the face there lie on the node's own line.
     """
     outside, beside = away
     if back:
-        takes = (outside < 0.0 and at_end and not pins.inside[k]) or (
-            outside < -DEEP_NODE_PART * length
-        )
+        deepest = DEEP_NODE_PART if on_chord or ends_line else LEFT_NODE_PART
+        takes = (outside < 0.0 and at_end and not pins.inside[k]) or outside < -deepest * length
     else:
         takes = outside < 0.0
     takes = takes or pins.held[k] or pins.hit_positions[k] >= 0.0
@@ -177,7 +179,9 @@ def lay(mover, pins, target, target_positions, rules, shifts, end_shifts):
         at_end = k == 0 or k == last
         ends_line = not straight and is_free_end(target, foot)
         shortest = min(length, measure_shorter(points, k))
-        if not is_laid(k, pins, (outside, beside), shortest, back, at_end, ends_line):
+        on_chord = not straight and target_positions[a] >= 0.0 and target_positions[a + 1] >= 0.0
+        away = outside, beside
+        if not is_laid(k, pins, away, shortest, back, at_end, ends_line, on_chord):
             continue
         if not straight and max(abs(x), abs(y)) <= STILL_NODE_DISTANCE * length:
             continue

@@ -234,10 +234,13 @@ def push_node(outlines, node, body, reach):
 def push_apart(outlines, bodies):
     """Push nodes that lie deep in another body, and the faces before them, apart; how many.
 
-    bodies (n,): the numbers of the bodies.
+    bodies (n,): the numbers of the bodies.  Where it comes to no end, as between three bodies that
+    leave no room, the nodes stay as after the first round.
     """
     total = 0
-    for _ in range(MOST_ROUNDS):
+    first_nodes = outlines.nodes
+    first_total = 0
+    for number in range(MOST_ROUNDS):
         moved = 0
         reach = SEARCHED_DEPTH_FACES * fill_face_boxes(outlines)
         for node in range(outlines.nodes.shape[1]):
@@ -246,10 +249,14 @@ def push_apart(outlines, bodies):
             for body in bodies:
                 if body != outlines.bodies[node] and push_node(outlines, node, body, reach):
                     moved += 1
-        total += moved
         if moved == 0:
-            break
-    return total
+            return total
+        total += moved
+        if number == 0:
+            first_nodes = outlines.nodes.copy()
+            first_total = total
+    outlines.nodes[...] = first_nodes
+    return first_total
 
 
 class Bodies:

@@ -231,4 +231,27 @@ def test_a_jet_runs_on(material, part):
     rows = march_whole(Simulation([plate, make_far_wall()], [], t_end=t_end, cfl=0.7))
     assert rows[-1]["contacts_made"] > 0
     assert max(row["cells_not_convex"] for row in rows[1:]) == 0
+
+
+def test_nodes_of_the_leader_do_not_stay_behind_faces_that_are_no_chords():
+    """A small quadrilateral hits a disc and leaves it: what the bodies share stays small."""
+    quadrilateral = make_quadrilateral(
+        "quadrilateral",
+        "Al1100",
+        [(20, -400), (700, -250), (760, 420), (60, 330)],
+        (7, 7),
+        -700.0,
+        0.0,
+    )
+    nodes = make_half_disc(8, 0.0, 5e-4)
+    disc = make_body("disc", "Cu", nodes, 300.0, material="metal")
+    disc.nodes[0] -= 5.6e-4
+    wall_off(disc, "j_min")
+    free(disc, "i_min", "i_max", "j_max")
+    quadrilateral.nodes[1] += 4.1e-4
+    simulation = Simulation([quadrilateral, disc], [], t_end=0.6e-6)
+    rows = march_whole(simulation)
+    overlaps = [row["contact_overlap"] for row in rows[1:]]
+    assert rows[-1]["contacts_made"] > 0
+    assert max(overlaps) < 0.02
     check_budget(rows, names=("energy",))

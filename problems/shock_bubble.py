@@ -120,9 +120,12 @@ FEATURES = {
     "R22": (
         Feature("incident shock", "wall_front", (0, 100), 415, 420, 415.2),
         Feature("refracted shock", "axis_front", (5, 170), 240, 254, 241.6),
+        Feature("transmitted shock", "axis_front", (202, 250), 540, 560, math.nan),
         Feature("upwind end", "upwind", (0, 200), 73, 74, 70.2),
         Feature("upwind end to 400 µs", "upwind", (0, 400), math.nan, math.nan, 65.0),
+        Feature("upwind end from 400 µs", "upwind", (400, 1000), 90, 90, math.nan),
         Feature("downwind end", "downwind", (200, 400), 78, 116, 91.9),
+        Feature("downwind end from 400 µs", "downwind", (400, 1000), 78, 82, math.nan),
     ),
 }
 # When the heavy bubble's downwind end, which the shock in the air had pushed upwind, turns:

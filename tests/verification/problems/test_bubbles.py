@@ -12,11 +12,19 @@ from shockgrid.problems.shock_bubble import (
     AIR_DENSITY,
     AIR_PRESSURE,
     BUBBLE_RADIUS,
+    FEATURES,
     ShockBubble,
     ShockBubbleDeck,
 )
 
 SPEED = 80.0
+
+
+@pytest.mark.parametrize("gas", ["helium", "R22"])
+def test_the_seven_measured_velocities_are_compared(gas):
+    measured = [feature for feature in FEATURES[gas] if np.isfinite(feature.measured)]
+    assert len(measured) == 7
+    assert len({feature.words for feature in FEATURES[gas]}) == len(FEATURES[gas])
 
 
 @pytest.mark.parametrize("gas", ["helium", "R22"])

@@ -56,6 +56,9 @@ NX, NY, SWEEP, X, Y = _rows(5)
 AREA_X, AREA_Y, SWEPT, X_AREA, Y_AREA = _rows(5)
 # outward fluxes: the rows of a flux of `hydro.rows`
 MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = _rows(6)
+# of solids: vectors of the lines through the cells, away from the sides inwards; cosines of the
+# angles by which these lines turn beyond the faces
+LINE_X, LINE_Y, TURN_GHOST = _rows(3)
 
 ROWS = next(_next)
 
@@ -127,6 +130,7 @@ def make_rim(faces: int, carried: int = 0) -> Rim:
     # what comes in from beyond an open side is not withheld
     rows[PART_BEYOND] = 1.0
     rows[LENGTH_GHOST] = 1.0
+    rows[TURN_GHOST] = 1.0
     return Rim(rows)
 
 

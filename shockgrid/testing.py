@@ -1,9 +1,9 @@
 """Checks for parts of shockgrid that other packages add: `sg.testing`.
 
-`check_regridder`, `check_eos`, `check_strength`, `check_boundary` and `check_problem` return
-nothing if a part is correct, and otherwise raise AssertionError with a sentence.  The tests of
-shockgrid check its own parts with the same functions; those of REGRIDDER_PROMISES can be called one
-by one.
+`check_regridder`, `check_eos`, `check_strength`, `check_spall`, `check_boundary` and
+`check_problem` return nothing if a part is correct, and otherwise raise AssertionError with a
+sentence.  The tests of shockgrid check its own parts with the same functions; those of
+REGRIDDER_PROMISES can be called one by one.
 
 Note: states and motions here are examples.  A part that passes may still fail for others.
 """
@@ -22,6 +22,7 @@ import numpy as np
 from shockgrid.hydro import phases, rim
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import SEGMENTS, NodeMotion, Segment, put
+from shockgrid.hydro.carried.fields import CarriedField
 from shockgrid.hydro.eos.base import (
     EquationOfState,
     measure_inverse,
@@ -30,8 +31,10 @@ from shockgrid.hydro.eos.base import (
     say_slope,
 )
 from shockgrid.hydro.eos.gases import IdealGas
+from shockgrid.hydro.eos.mie_gruneisen import MieGruneisen
 from shockgrid.hydro.simulation import Simulation
 from shockgrid.hydro.strength.laws import StrengthLaw
+from shockgrid.hydro.strength.spall import SolidCells, SpallLaw
 from shockgrid.problems.deck import Deck
 from shockgrid.problems.problem import Problem
 from shockgrid.problems.registry import load_problem
@@ -411,6 +414,134 @@ def check_strength(law: StrengthLaw, rho0: float | None = None) -> None:
             _demand(same, "it depends on the temperature, but needs_temperature is False")
     except AssertionError as error:
         raise AssertionError(f"law of strength {law.kind}: {error}") from None
+
+
+# --- laws of spall -----------------------------------------------------------------------------
+
+SPALLING_SOLID = MieGruneisen(8930.0, 3940.0, 1.489, 1.99, 1e11)
+SPALLING_PRESSURES = (-2e10, -5e9, -1e9, -1e7, 0.0, 1e7, 1e9, 3e10)  # [Pa], of whole material
+SHEAR_STRESSES = (0.0, 1e6, 3e8)  # [Pa]
+STRAIN_GAINS = (0.0, 1e-4, 0.1)  # of the plastic strain in a step
+EXTENTS_OF_CELLS = (1e-6, 1e-3)  # [m]
+SPALLING_STEPS = (0.0, 1e-10, 1e-7, 1e-7)  # [s], one after the other
+SPALLING_TEMPERATURE = 600.0  # [K]
+SPALLING_RATE = 1e4  # [1/s]
+
+
+def list_spalling_cells() -> SolidCells:
+    """Cells (n,) of a solid at rest, in tension and pressed together, with and without shear."""
+    all_of_them = itertools.product(
+        SPALLING_PRESSURES, SHEAR_STRESSES, STRAIN_GAINS, EXTENTS_OF_CELLS
+    )
+    pressure, shear, strained, extent = np.array(list(all_of_them)).T.copy()
+    eos = SPALLING_SOLID
+    # in compression on the isentrope, near enough; in tension at the density where e = 0
+    density = eos.rho0 / (1.0 - pressure / (eos.rho0 * eos.c0**2 + 4.0 * np.maximum(pressure, 0.0)))
+    full = np.ones(pressure.shape)
+    return SolidCells(
+        eos=eos,
+        density=density,
+        pressure=pressure,
+        energy=eos.energy(density, pressure),
+        sound=eos.sound_speed(density, pressure),
+        stress=np.array([shear, -0.5 * shear, 0.3 * shear]),
+        strained=strained,
+        strain_rate=SPALLING_RATE * full,
+        temperature=SPALLING_TEMPERATURE * full,
+        extent=extent,
+    )
+
+
+def arrange_cells(cells: SolidCells, arrange: Callable[[np.ndarray], np.ndarray]) -> SolidCells:
+    """The cells in another order or shape."""
+    arranged = {
+        name: arrange(value) if isinstance(value, np.ndarray) else value
+        for name, value in cells._asdict().items()
+    }
+    return SolidCells(**arranged)
+
+
+def say_spalling_cell(cells: SolidCells, k: int) -> str:
+    """One of the cells in words."""
+    return (
+        f"a whole pressure of {cells.pressure[k]:g} Pa, s_xx {cells.stress[0, k]:g} Pa, a plastic "
+        f"strain of {cells.strained[k]:g} in a step and an extent of {cells.extent[k]:g} m"
+    )
+
+
+def check_spall_step(law: SpallLaw, values: np.ndarray, cells: SolidCells, dt: float) -> None:
+    """One step of a law, whose fields `values` (n, cells) it advances."""
+    before = [np.copy(one) for one in cells if isinstance(one, np.ndarray)]
+    old_values = values.copy()
+    found = law.relax(values, cells, dt)
+    shape = np.shape(found)
+    _demand(
+        shape == cells.pressure.shape, f"relax gives the shape {shape} for {cells.pressure.shape}"
+    )
+    after = [one for one in cells if isinstance(one, np.ndarray)]
+    _demand(all(map(np.array_equal, before, after)), "relax writes its cells")
+
+    def demand_everywhere(kept: np.ndarray, words: str) -> None:
+        bad = np.flatnonzero(~kept)
+        if len(bad):
+            raise AssertionError(f"{words} at {say_spalling_cell(cells, bad[0])}")
+
+    # pressures: those of whole material, or less tension
+    broken = law.find_broken(values)
+    demand_everywhere(np.isfinite(found), "relax gives no number")
+    demand_everywhere(found >= cells.pressure, "relax gives more tension than whole material has")
+    demand_everywhere((found >= 0.0) | ~broken, "a broken cell bears tension")
+    pressed = (cells.pressure >= 0.0) & ~broken
+    demand_everywhere((found == cells.pressure) | ~pressed, "relax changes a pressure")
+    # the fields
+    for field, numbers in zip(law.fields, values, strict=True):
+        inside = np.isfinite(numbers) & (numbers >= field.least) & (numbers <= field.most)
+        demand_everywhere(inside, f"the field {field.name} leaves its bounds")
+    pulled = cells.pressure < 0.0
+    healed = law.find_broken(old_values) & ~broken & pulled
+    demand_everywhere(~healed, "a broken cell heals under tension")
+    # each cell by itself, in any shape
+    square = old_values.reshape(len(values), -1, 4)
+    found_square = law.relax(square, arrange_cells(cells, _fold), dt)
+    same = np.array_equal(found_square.ravel(), found)
+    _demand(same, "relax gives other numbers for cells (ni, nj) than for (n,)")
+
+
+def _fold(values: np.ndarray) -> np.ndarray:
+    """Values (..., n) of cells as (..., n/4, 4)."""
+    return values.reshape(*values.shape[:-1], -1, 4)
+
+
+def check_spall(law: SpallLaw) -> None:
+    """Check a law of spall in all respects, at some hundred cells of copper over four steps.
+
+    AssertionError names the cell: whole pressures of -20 to 30 GPa, with and without shear, plastic
+    strain, and time.
+    """
+    cells = list_spalling_cells()
+    try:
+        _demand(law.fields, "it carries no fields")
+        for field in law.fields:
+            _demand(isinstance(field, CarriedField), f"{field!r} of its fields is no CarriedField")
+        _demand(pickle.loads(pickle.dumps(law)) == law, "pickled and read again it is another law")
+        _demand(hash(law) == hash(law), "it has no hash: mark the class @dataclass(frozen=True)")
+        values = np.zeros((len(law.fields), cells.pressure.size))
+        _demand(not law.find_broken(values).any(), "new material, whose fields are 0, is broken")
+        turned_values = values[:, ::-1].copy()
+        turned = arrange_cells(cells, lambda one: one[..., ::-1].copy())
+        for dt in SPALLING_STEPS:
+            check_spall_step(law, values, cells, dt)
+            law.relax(turned_values, turned, dt)
+        same = np.array_equal(turned_values[:, ::-1], values)
+        _demand(same, "what it does to a cell depends on other cells")
+        if not law.needs_temperature:
+            cold_values = np.zeros(values.shape)
+            for dt in SPALLING_STEPS:
+                law.relax(cold_values, cells._replace(temperature=None), dt)
+            same = np.array_equal(cold_values, values)
+            _demand(same, "it depends on the temperature, but needs_temperature is False")
+    except AssertionError as error:
+        raise AssertionError(f"law of spall {law.kind}: {error}") from None
 
 
 # --- boundary kinds ----------------------------------------------------------------------------

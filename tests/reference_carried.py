@@ -17,12 +17,12 @@ limit = np.vectorize(limit_van_leer)
 def find_faces(patch, sides):
     """Mass per time and values at the faces of a patch, by axis; at its sides none yet."""
     values = get_values(patch)
-    slopes, half = reconstruct(patch, pad(patch, sides))
-
-    def trace(points):
-        return half + np.einsum("cqij,cij->qij", slopes, points - patch.centre)
-
-    patch.trace_carried = trace
+    if patch.block.strength is None:  # solids have it from the start
+        slopes, half = reconstruct(patch, pad(patch, sides))
+        patch.trace_carried = lambda points: (
+            half + np.einsum("cqij,cij->qij", slopes, points - patch.centre)
+        )
+    trace = patch.trace_carried
     through = {}
     for axis, (_, _, middle) in patch.faces.items():
         mass = patch.fluxes[axis][0]
@@ -86,7 +86,7 @@ def pad(patch, sides):
     return padded
 
 
-def reconstruct(patch, padded):
+def reconstruct(patch, padded, limit=limit):
     """Slopes (2, n, ni, nj) bounded by the values around, and values at mid-time."""
     values = get_values(patch)
     around = {

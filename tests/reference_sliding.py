@@ -133,7 +133,7 @@ class SlidingContact:
         for side, line, faces in zip(self.sides, lines, (self.leader, self.follower), strict=True):
             rho, u, v, p, c2 = self.find_states_at_pieces(find(side), line, faces)
             w = dot((u, v), self.normal)
-            found.append((rho, w, p, np.sqrt(c2), side.patch.eos.wave_law))
+            found.append((rho, w, p, np.sqrt(c2), side.patch.block.wave_law))
         one, two = found
         pressure, speed = solve_contact(*one, *two)
         bare = (self.follower < 0) | (pressure < 0.0)

@@ -41,16 +41,18 @@ Trace = namedtuple("Trace", "rho u v p e c2 hll acoustic part")  # rows of what 
 find_wall_pressure = np.vectorize(riemann.compute_wave_pressure, excluded={3})
 
 
-def take_step(blocks, links, t, dt, curved=False, contacts=(), carry=None):
+def take_step(blocks, links, t, dt, curved=False, contacts=(), carry=None, kinds=None):
     """New states (4, ni, nj) and void energies of all blocks, in their order.
 
-    With `carry` of `reference_carried`: then also the new values of carried fields.
+    With `carry` of `reference_carried`: then also the new values of carried fields.  kinds: the
+    classes of patches and sides, if these are no fluids (`reference_solid`).
 
     A block has `nodes`, `nodes_new`, `state` (4, ni + 2, nj + 2), whose ghosts are not read,
     `void_energy`, `eos`, `limiter`, `is_first_order`, `flux_name` and `segments`.
     """
-    patches = [Patch(block, dt, curved) for block in blocks]
-    sides = {id(s): Side(patch, s) for patch in patches for s in patch.block.segments}
+    make_patch, make_side = kinds or (Patch, Side)
+    patches = [make_patch(block, dt, curved) for block in blocks]
+    sides = {id(s): make_side(patch, s) for patch in patches for s in patch.block.segments}
     for link in links:
         one = sides[id(link.leader)]
         two = sides[id(link.follower)]
@@ -434,7 +436,7 @@ class Side:
             part = self.shorten(excess, normal) if kind == "piston" else 1.0
             state[1:3] -= 2.0 * part * excess * normal
         elif kind in ("interface", "free-surface", "sliding"):
-            pressure, speed = self.solve(Side.find_state_at_face, normal, t)
+            pressure, speed = self.solve(type(self).find_state_at_face, normal, t)
             c2 = self.take(patch.c2)
             rise = 2.0 * (pressure - state[3])
             jump = np.minimum(2.0 * (speed - dot(state[1:3], normal)), 1.5 * np.sqrt(c2))
@@ -483,13 +485,13 @@ class Side:
         if self.segment.kind == "sliding":
             return self.contact.find_surface(self, normal)
         rho, u, v, p, c2 = find(self)
-        law = self.patch.eos.wave_law
+        law = self.patch.block.wave_law
         mine = rho, dot((u, v), normal), p, np.sqrt(c2), law
         if self.partner is None:
             pressure = self.segment.pressure(t) + 0.0 * rho
             return pressure, find_free_speed(*mine, pressure)
         rho, u, v, p, c2 = self.ask(find)
-        law = self.partner.patch.eos.wave_law
+        law = self.partner.patch.block.wave_law
         return solve_contact(*mine, rho, dot((u, v), normal), p, np.sqrt(c2), law)
 
     def find_inflow(self, t):
@@ -536,7 +538,7 @@ class Side:
         """What presses on faces that nothing passes."""
         area, sweep, _ = (self.sign * self.take(q) for q in self.patch.plane_faces[self.axis])
         normal = area / np.hypot(*area)
-        law = self.patch.eos.wave_law
+        law = self.patch.block.wave_law
         if self.segment.kind in ("interface", "free-surface"):
             return self.solve(lambda side: side.find_trace()[[0, 1, 2, 3, 5]], normal, t)[0]
         change = dot((trace.u, trace.v), normal) - sweep / np.hypot(*area)

@@ -41,6 +41,8 @@ from shockgrid.hydro.rim import (
     CARRIED_GHOST,
     CARRIED_TRACE,
     LENGTH_GHOST,
+    U_GHOST,
+    V_GHOST,
     X_TRACE,
     Y_TRACE,
     find_carried_row,
@@ -66,6 +68,7 @@ CORNER_Y = 13
 METRIC_ROWS = 17
 
 NO_SIDES = np.zeros((0, 3), dtype=np.int64)  # stands for the open sides of a block
+NO_RATES = np.zeros((1, 1, 1))  # stands for the rates of a fluid
 
 
 @inlined
@@ -129,9 +132,16 @@ def make_difference_weights(geometry: Geometry):
 
 
 @functools.cache
-def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
-    """Kernel that fills the slopes of carried fields, of a geometry and a limiter's formula."""
+def make_predict(
+    geometry: Geometry, limit: Callable = limit_van_leer, fill_rates: Callable | None = None
+):
+    """Kernel that fills the slopes of carried fields, of a geometry and a limiter's formula.
+
+    fill_rates: of a solid, formula (`hydro.strength.rates.make_fill_rates`) that fills the rates of
+    strain of a cell on the way, as the weights of differences are there.
+    """
     curved = geometry.curved
+    is_solid = fill_rates is not None
     compute_difference_weights = make_difference_weights(geometry)
 
     @compiled_once(allocates=False)
@@ -234,13 +244,20 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
         for j in range(slopes.shape[2]):
             fill_slope(field, state, i, j, half_dt, metrics, slopes)
 
+    @compiled_once(allocates=False)
+    def fill_rates_of_row(state, i, metrics, centres, rates):
+        """`fill_rates` of the cells of a row."""
+        for j in range(centres.shape[2]):
+            fill_rates(state, i, j, metrics, centres, rates)
+
     @kernel(allocates=False)
-    def predict(values, state, nodes, rim, half_dt, rows, scratch):
+    def predict(values, state, nodes, rim, half_dt, rows, scratch, rates):
         """Slopes (n, 3, ni, nj) of fields (n, ni + 2, nj + 2) in the cells that a step reads.
 
         These are the rows first..last - 1 of cells of `rows`, one more on either side, and the
         cells along all sides.  scratch: measures (4, ni + 2, nj + 2), centres (2, ni, nj), the
-        slopes, and metrics (METRIC_ROWS, nj) of a row of cells, which are filled.
+        slopes, and metrics (METRIC_ROWS, nj) of a row of cells, which are filled; rates: of a
+        solid, likewise.
         """
         measures, centres, slopes, metrics = scratch
         ni = nodes.shape[1] - 1
@@ -261,17 +278,24 @@ def make_predict(geometry: Geometry, limit: Callable = limit_van_leer):
         place_ghosts(rim, LENGTH_GHOST, measures[LENGTH_J])
         for q in range(values.shape[0]):
             place_ghosts(rim, find_carried_row(q) + CARRIED_GHOST, values[q])
+        if is_solid:
+            place_ghosts(rim, U_GHOST, state[U])
+            place_ghosts(rim, V_GHOST, state[V])
         # slopes row by row, all fields of each
         for i in range(ni):
             if low <= i < high or i == 0 or i == ni - 1:
                 weigh_row(nodes, i, measures, centres, metrics)
                 for q in range(values.shape[0]):
                     fill_row(values[q], state, i, half_dt, metrics, slopes[q])
+                if is_solid:
+                    fill_rates_of_row(state, i, metrics, centres, rates)
                 continue
             for j in (0, nj - 1):
                 weigh_cell(nodes, i, j, measures, centres, metrics)
                 for q in range(values.shape[0]):
                     fill_slope(values[q], state, i, j, half_dt, metrics, slopes[q])
+                if is_solid:
+                    fill_rates(state, i, j, metrics, centres, rates)
 
     return predict
 
@@ -480,13 +504,19 @@ class Transport:
         """Phase 2, before the couplings fill what is beyond the sides: see `gather`."""
         gather(block.get_start("carried"), block.rim.rows)
 
-    def predict(self, block: Any, half_dt: float) -> None:
-        """Phase 2, after the couplings: slopes and values at mid-time."""
-        predict = make_predict(block.geometry, self.limit)
+    def predict(
+        self,
+        block: Any,
+        half_dt: float,
+        fill_rates: Callable | None = None,
+        rates: np.ndarray = NO_RATES,
+    ) -> None:
+        """Phase 2, after the couplings: slopes and values at mid-time; rates of a solid."""
+        predict = make_predict(block.geometry, self.limit, fill_rates)
         predict(
             block.get_start("carried"), block.start, block.nodes, block.rim.rows, half_dt,
             (block.rows.start, block.rows.stop),
-            (self.measures, self.centres, self.slopes, self.metrics),
+            (self.measures, self.centres, self.slopes, self.metrics), rates,
         )  # fmt: skip
 
     def trace(self, block: Any) -> None:

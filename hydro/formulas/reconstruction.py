@@ -260,6 +260,15 @@ def compute_weights(length_before, length, length_after):
     return scale * distance_after, scale * distance_before
 
 
+@inlined
+def compute_turn(line, next_line):
+    """Cosine of the angle between the line vectors (x, y) of two neighbouring cells."""
+    x, y = line
+    next_x, next_y = next_line
+    squares = (x * x + y * y) * (next_x * next_x + next_y * next_y)
+    return (x * next_x + y * next_y) / (squares**0.5 + TINY_SLOPE)
+
+
 # --- failed cells ---------------------------------------------------------------------------------
 
 # At their faces failed cells have their own energy and sound speed, whatever the trace there.  The

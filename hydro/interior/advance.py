@@ -44,7 +44,7 @@ from shockgrid.hydro.interior.scratch import (
 from shockgrid.hydro.interior.slopes import fill_steps
 from shockgrid.hydro.interior.solid import SolidArrays
 from shockgrid.hydro.interior.update import make_update
-from shockgrid.hydro.rim import LENGTH_GHOST, MASS
+from shockgrid.hydro.rim import LENGTH_GHOST, MASS, TURN_GHOST
 from shockgrid.hydro.rows import (
     EMPTIED,
     FIRST_ORDER,
@@ -302,6 +302,8 @@ def make_flow_kernels(
         copy_rows(nodes_new, row, start, count, Z, scratch.X_HIGH_NEW + shift)
         copy_rows(nodes, row + 1, start, count, Z, scratch.X_NEXT + shift)
         measure_after(Z, tile.padded)
+        if is_solid and row == 0:
+            copy_row(rim, TURN_GHOST, tile.first_column, tile.cells, Z, scratch.TURN_AFTER + 1)
         copy_rows(state, row + 1, tile.first_column, tile.cells + 2, Z, scratch.RHO_AFTER)
         fill_steps(Z, tile.whole)
         fill_faces_i(Z, tile.whole, inverse_dt)
@@ -351,6 +353,8 @@ def make_flow_kernels(
                     copy_row(rim, LENGTH_GHOST, nj + column, cells, Z, scratch.LENGTH_AFTER + 1)
                     if curved:
                         clear_shift_after(Z, padded)
+                    if is_solid:
+                        copy_row(rim, TURN_GHOST, nj + column, cells, Z, scratch.TURN_AFTER + 1)
                 if opens_voids:
                     copy_row(void_energy, row, column, cells, Z, scratch.VOID_LOADED + 1)
                 if is_solid:
@@ -370,6 +374,9 @@ def make_flow_kernels(
                 at_high = tile.stop_column == nj
                 length_below = rim[LENGTH_GHOST, 2 * nj + row] if at_low else -1.0
                 length_above = rim[LENGTH_GHOST, 2 * nj + ni + row] if at_high else -1.0
+                if is_solid:
+                    Z[scratch.TURN_ENDS] = rim[TURN_GHOST, 2 * nj + row]
+                    Z[scratch.TURN_ENDS + 1] = rim[TURN_GHOST, 2 * nj + ni + row]
                 reconstruct(Z, cells, padded, length_below, length_above, 0.5 * dt, parameters)
                 first_hll_before = first_hll_cell
                 last_hll_before = last_hll_cell

@@ -15,6 +15,7 @@ from shockgrid.hydro.formulas.reconstruction import (
     choose_limit,
     compute_hll_switch,
     compute_line_geometry,
+    compute_turn,
     mark_voided,
 )
 from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
@@ -69,6 +70,45 @@ def fill_length_j(Z, n):
             - (Z[scratch.Y_LOW + k] + Z[scratch.Y_HIGH + k])
         )
         Z[scratch.LENGTH_J + k] = (dx * dx + dy * dy) ** 0.5
+
+
+@compiled_once(allocates=False)
+def fill_turn_after(Z, n):
+    """Cosines of the angles between the lines along i through the current row and the next."""
+    for k in range(1, n + 1):
+        x = (Z[scratch.X_HIGH + k] + Z[scratch.X_HIGH + k + 1]) - (
+            Z[scratch.X_LOW + k] + Z[scratch.X_LOW + k + 1]
+        )
+        y = (Z[scratch.Y_HIGH + k] + Z[scratch.Y_HIGH + k + 1]) - (
+            Z[scratch.Y_LOW + k] + Z[scratch.Y_LOW + k + 1]
+        )
+        x_after = (Z[scratch.X_NEXT + k] + Z[scratch.X_NEXT + k + 1]) - (
+            Z[scratch.X_HIGH + k] + Z[scratch.X_HIGH + k + 1]
+        )
+        y_after = (Z[scratch.Y_NEXT + k] + Z[scratch.Y_NEXT + k + 1]) - (
+            Z[scratch.Y_HIGH + k] + Z[scratch.Y_HIGH + k + 1]
+        )
+        Z[scratch.TURN_AFTER + k] = compute_turn((x, y), (x_after, y_after))
+
+
+@compiled_once(allocates=False)
+def fill_turn_j(Z, n):
+    """Cosines of the angles between the lines along j through the row's cells and those before."""
+    for k in range(1, n + 1):
+        middle_x = Z[scratch.X_LOW + k] + Z[scratch.X_HIGH + k]
+        middle_y = Z[scratch.Y_LOW + k] + Z[scratch.Y_HIGH + k]
+        x = (Z[scratch.X_LOW + k + 1] + Z[scratch.X_HIGH + k + 1]) - middle_x
+        y = (Z[scratch.Y_LOW + k + 1] + Z[scratch.Y_HIGH + k + 1]) - middle_y
+        x_below = middle_x - (Z[scratch.X_LOW + k - 1] + Z[scratch.X_HIGH + k - 1])
+        y_below = middle_y - (Z[scratch.Y_LOW + k - 1] + Z[scratch.Y_HIGH + k - 1])
+        Z[scratch.TURN_J + k] = compute_turn((x_below, y_below), (x, y))
+
+
+@compiled_once(allocates=False)
+def move_turns(Z, n):
+    """Make the row after the current one current."""
+    for k in range(1 - scratch.VECTOR_LANES, n + 1 + scratch.VECTOR_LANES):
+        Z[scratch.TURN_BEFORE + k] = Z[scratch.TURN_AFTER + k]
 
 
 def make_geometry(compute_volume):
@@ -147,6 +187,7 @@ def make_row_kernels(
     """
     sound = eos_class.sound_speed_squared_part
     curved = geometry.curved
+    turns = is_solid and not curved  # do its lines' angles count? (theory F20.12)
     switch = sound, eos_class.energy_part, HLL_JUMP_THRESHOLDS[flux], eos_class.opens_voids
     limit = choose_limit(limiter, eos_class.has_kinks or is_solid)
     fill_gradients = make_slopes(limit, limiter in RELAXED, geometry, switch, is_solid)
@@ -159,11 +200,15 @@ def make_row_kernels(
         fill_length_after(Z, n)
         if curved:
             fill_shift_after(Z, n)
+        if turns:
+            fill_turn_after(Z, n)
 
     @compiled_once(allocates=False)
     def next_row(Z, n):
         """Make the row after the current one current."""
         scratch.shift_rows(Z, n)
+        if turns:
+            move_turns(Z, n)
         if curved:
             move_shifts(Z, n)
 
@@ -186,6 +231,12 @@ def make_row_kernels(
         if length_above >= 0.0:
             Z[scratch.LENGTH_J + m + 1] = length_above
             Z[scratch.SHIFT_J + m + 1] = 0.0
+        if turns:
+            fill_turn_j(Z, n)
+            if length_below >= 0.0:
+                Z[scratch.TURN_J + 1] = Z[scratch.TURN_ENDS]
+            if length_above >= 0.0:
+                Z[scratch.TURN_J + m + 1] = Z[scratch.TURN_ENDS + 1]
         if curved:
             fill_switch(Z, n, parameters)
             fill_smooth(Z, n)

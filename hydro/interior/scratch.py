@@ -107,6 +107,10 @@ STRESS_J, *_ = _rows(4)
 STRESS_SIDE = next(_next)
 SPEED_I_X, SPEED_I_Y = _rows(2)
 SPEED_J_X, SPEED_J_Y = _rows(2)
+# cosines of the angles by which lines turn towards the cells before, after and below
+TURN_BEFORE, TURN_AFTER, TURN_J = _rows(3)
+# and towards the ghosts below and above a row of cells: entries 0 and 1
+TURN_ENDS = next(_next)
 
 SIZE = next(_next) + 1
 

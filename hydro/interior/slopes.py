@@ -157,6 +157,18 @@ def make_slopes(limit, relaxed, geometry, switch, is_solid=False):
             )
             Z[scratch.P_STEP + k] = step_after
             p_x, p_y = compute_gradient(along_i, along_j, line_i, line_j, inverse)
+            if is_solid and not curved:
+                # a body that turns as a whole has no variation but its rotation (theory F20.12)
+                weight_before, weight_after = compute_weights(
+                    Z[scratch.LENGTH_BEFORE + k] * Z[scratch.TURN_BEFORE + k],
+                    Z[scratch.LENGTH + k],
+                    Z[scratch.LENGTH_AFTER + k] * Z[scratch.TURN_AFTER + k],
+                )
+                weight_below, weight_above = compute_weights(
+                    Z[scratch.LENGTH_J + k - 1] * Z[scratch.TURN_J + k],
+                    Z[scratch.LENGTH_J + k],
+                    Z[scratch.LENGTH_J + k + 1] * Z[scratch.TURN_J + k + 1],
+                )
             # velocity: limited along and across each line
             square_i = mid_i_x * mid_i_x + mid_i_y * mid_i_y
             square_j = mid_j_x * mid_j_x + mid_j_y * mid_j_y

@@ -48,6 +48,8 @@ from shockgrid.hydro.rim import (
     HLL,
     LENGTH,
     LENGTH_GHOST,
+    LINE_X,
+    LINE_Y,
     NX,
     NY,
     P_HALF,
@@ -62,6 +64,7 @@ from shockgrid.hydro.rim import (
     RHO_TRACE,
     RHO_X,
     RHO_Y,
+    TURN_GHOST,
     U_HALF,
     U_NEXT,
     U_STAR,
@@ -237,6 +240,9 @@ def make_side_kernels(
                 copy_nodes(nodes, strip, 0, start, m, Z, scratch.X_HIGH)
                 copy_nodes(nodes, strip, 1, start, m, Z, scratch.X_NEXT)
                 measure_after(Z, n)
+                if is_solid:
+                    for k in range(m):
+                        store_line(Z, k + 1, rim, first + k * step)
                 # the cells' states, and the same at their faces
                 for k in range(m):
                     face = first + k * step
@@ -263,6 +269,14 @@ def make_side_kernels(
                 # states extrapolated to the faces (theory F4.7)
                 if wanted and is_deep:
                     extrapolate(Z, m, inwards, first, step, parameters, rim)
+
+    @compiled_once(allocates=False)
+    def store_line(Z, k, rim, face):
+        """The line through cell k of a strip, between the rows of nodes that are there."""
+        x = Z[scratch.X_NEXT + k] + Z[scratch.X_NEXT + k + 1]
+        y = Z[scratch.Y_NEXT + k] + Z[scratch.Y_NEXT + k + 1]
+        rim[LINE_X, face] = x - (Z[scratch.X_HIGH + k] + Z[scratch.X_HIGH + k + 1])
+        rim[LINE_Y, face] = y - (Z[scratch.Y_HIGH + k] + Z[scratch.Y_HIGH + k + 1])
 
     @compiled_once(allocates=False)
     def load_rows_inwards(state, nodes, strip, start, is_deep, Z):
@@ -301,6 +315,9 @@ def make_side_kernels(
                 copy_state(state, strip, -1, start, m, Z, scratch.RHO)
                 copy_nodes(nodes, strip, 1, start, m, Z, scratch.X_NEXT)
                 measure_after(Z, n)
+                if is_solid:
+                    for k in range(m):
+                        Z[scratch.TURN_AFTER + 1 + k] = rim[TURN_GHOST, first + k * step]
                 copy_state(state, strip, 0, start, m, Z, scratch.RHO_AFTER)
                 fill_steps(Z, n)
                 next_row(Z, n)
@@ -317,6 +334,8 @@ def make_side_kernels(
                         i, j = find_strip_cell(strip, 0, start + k)
                         Z[scratch.STRESS_X + 1 + k] = solid.pull[0, i, j]
                         Z[scratch.STRESS_Y + 1 + k] = solid.pull[1, i, j]
+                    Z[scratch.TURN_ENDS] = rim[TURN_GHOST, strip.face_before]
+                    Z[scratch.TURN_ENDS + 1] = rim[TURN_GHOST, strip.face_after]
                 low = rim[LENGTH_GHOST, strip.face_before] if start == 0 else -1.0
                 high = rim[LENGTH_GHOST, strip.face_after] if start + m == strip.cells else -1.0
                 reconstruct(Z, m, n, low, high, half_dt, parameters)

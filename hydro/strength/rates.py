@@ -11,16 +11,22 @@ import functools
 
 from shockgrid.hydro.carried.transport import (
     AT_CENTRE,
-    LENGTH_I,
-    LENGTH_J,
+    INVERSE_AREA,
+    LINE_I_X,
+    LINE_I_Y,
+    LINE_J_X,
+    LINE_J_Y,
+    SLOPE_PARTS,
     SLOPE_X,
     SLOPE_Y,
+    WEIGHT_ABOVE,
+    WEIGHT_AFTER,
+    WEIGHT_BEFORE,
+    WEIGHT_BELOW,
     find_value,
-    make_difference_weights,
-    place_ghosts,
 )
 from shockgrid.hydro.eos.conversion import has_voids
-from shockgrid.hydro.formulas.geometry import Geometry, lean_lines
+from shockgrid.hydro.formulas.geometry import Geometry
 from shockgrid.hydro.formulas.reconstruction import (
     compute_gradient,
     compute_line_geometry,
@@ -34,8 +40,7 @@ from shockgrid.hydro.formulas.strength import (
     turn_stress,
 )
 from shockgrid.hydro.interior.scratch import find_twist
-from shockgrid.hydro.perimeter.faces import find_corners
-from shockgrid.hydro.rim import U_GHOST, V_GHOST, find_first_face
+from shockgrid.hydro.rim import find_first_face
 from shockgrid.hydro.rows import U, V
 from shockgrid.regrid.jit import compiled_once, inlined, kernel
 from shockgrid.regrid.sides import I_MAX, J_MAX, J_MIN
@@ -74,73 +79,50 @@ def is_row_read(i, ni, rows):
 
 
 @functools.cache
-def make_predict_rates(geometry: Geometry):
-    """Kernel that fills the rates at the start of a step, of a geometry."""
+def make_fill_rates(geometry: Geometry):
+    """Formula that fills the rates of a cell at the start of a step, of a geometry.
+
+    metrics: of `hydro.carried.transport`, of the row of cells i.
+    """
     curved = geometry.curved
-    compute_difference_weights = make_difference_weights(geometry)
     limit_velocity = make_limit_velocity(limit_gently)
 
     @inlined
-    def limit_along(state, measures, length, here, before, after, line):
-        """Limited variation of the velocity along a line through three cells (i, j)."""
-        weight_before, weight_after = compute_difference_weights(
-            measures, length, here, before, after
-        )
-        u = state[U, here[0], here[1]]
-        v = state[V, here[0], here[1]]
+    def limit_along(u, v, steps, weights, line):
+        """Limited variation of the velocity along a line; steps: (u, v) of the neighbours."""
+        (u_before, v_before), (u_after, v_after) = steps
+        weight_before, weight_after = weights
         return limit_velocity(
-            (u - state[U, before[0], before[1]]) * weight_before,
-            (v - state[V, before[0], before[1]]) * weight_before,
-            (state[U, after[0], after[1]] - u) * weight_after,
-            (state[V, after[0], after[1]] - v) * weight_after,
+            (u - u_before) * weight_before,
+            (v - v_before) * weight_before,
+            (u_after - u) * weight_after,
+            (v_after - v) * weight_after,
             line[0],
             line[1],
             1.0 / (line[0] * line[0] + line[1] * line[1]),
         )
 
     @inlined
-    def fill_rates(state, nodes, i, j, measures, centres, rates):
-        a, b, c, d = find_corners(nodes, i, j)
-        mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-        line_i, line_j = mid_i, mid_j
-        inverse = 1.0 / area
-        if curved:
-            twist, y = find_twist(a, b, c, d)
-            line_i, line_j = lean_lines(mid_i, mid_j, twist, y)
-            inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])
-        here = i + 1, j + 1
-        u_i, v_i = limit_along(state, measures, LENGTH_I, here, (i, j + 1), (i + 2, j + 1), mid_i)
-        u_j, v_j = limit_along(state, measures, LENGTH_J, here, (i + 1, j), (i + 1, j + 2), mid_j)
+    def fill_rates(state, i, j, metrics, centres, rates):
+        u = state[U, i + 1, j + 1]
+        v = state[V, i + 1, j + 1]
+        line_i = metrics[LINE_I_X, j], metrics[LINE_I_Y, j]
+        line_j = metrics[LINE_J_X, j], metrics[LINE_J_Y, j]
+        inverse = metrics[INVERSE_AREA, j]
+        before = state[U, i, j + 1], state[V, i, j + 1]
+        after = state[U, i + 2, j + 1], state[V, i + 2, j + 1]
+        weights = metrics[WEIGHT_BEFORE, j], metrics[WEIGHT_AFTER, j]
+        u_i, v_i = limit_along(u, v, (before, after), weights, line_i)
+        below = state[U, i + 1, j], state[V, i + 1, j]
+        above = state[U, i + 1, j + 2], state[V, i + 1, j + 2]
+        weights = metrics[WEIGHT_BELOW, j], metrics[WEIGHT_ABOVE, j]
+        u_j, v_j = limit_along(u, v, (below, above), weights, line_j)
         u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
         v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
-        hoop = state[V, i + 1, j + 1] / centres[1, i, j] if curved else 0.0
+        hoop = v / centres[1, i, j] if curved else 0.0
         keep_rates(rates, i, j, (u_x, u_y, v_x, v_y), hoop)
 
-    @compiled_once(allocates=False)
-    def fill_row(state, nodes, i, measures, centres, rates):
-        """`fill_rates` of the cells of a row."""
-        for j in range(centres.shape[2]):
-            fill_rates(state, nodes, i, j, measures, centres, rates)
-
-    @kernel(allocates=False)
-    def predict_rates(state, rim, nodes, lines, rows, rates):
-        """Rates (5, ni, nj) from a state, whose ghosts are those of the rim from now on.
-
-        lines: measures and centres of `Transport`.
-        """
-        measures, centres = lines
-        ni = nodes.shape[1] - 1
-        nj = nodes.shape[2] - 1
-        place_ghosts(rim, U_GHOST, state[U])
-        place_ghosts(rim, V_GHOST, state[V])
-        for i in range(ni):
-            if is_row_read(i, ni, rows):
-                fill_row(state, nodes, i, measures, centres, rates)
-                continue
-            for j in (0, nj - 1):
-                fill_rates(state, nodes, i, j, measures, centres, rates)
-
-    return predict_rates
+    return fill_rates
 
 
 @functools.cache
@@ -257,70 +239,111 @@ def make_predict_stress(geometry: Geometry):
     curved = geometry.curved
 
     @inlined
-    def predict_cell(values, slopes, rates, laws, half_dt, centres, place, arrays):
-        """Stress of a cell (i, j) at mid-time, and its force."""
+    def find_gains(values, rates, laws, half_dt, place, shear, gains):
+        """What strain and rotation add to the stress of a cell (i, j) in half a step."""
         flow_stress, hardening = laws
         i, j = place
         s_xx = values[S_XX, i + 1, j + 1]
         s_yy = values[S_YY, i + 1, j + 1]
         s_xy = values[S_XY, i + 1, j + 1]
-        shear = arrays.shear[i, j]
         new_xx, new_yy, new_xy, _ = strain_stress(
-            (s_xx, s_yy, s_xy), rates, i, j, shear, flow_stress[i, j], hardening[i, j], half_dt
-        )
-        # nothing that fluids and pieces bear
-        kept = 1.0 if shear > 0.0 else 0.0
-        mid_xx = kept * (slopes[S_XX, AT_CENTRE, i, j] + (new_xx - s_xx))
-        mid_yy = kept * (slopes[S_YY, AT_CENTRE, i, j] + (new_yy - s_yy))
-        mid_xy = kept * (slopes[S_XY, AT_CENTRE, i, j] + (new_xy - s_xy))
-        xx_x = kept * slopes[S_XX, SLOPE_X, i, j]
-        xx_y = kept * slopes[S_XX, SLOPE_Y, i, j]
-        yy_x = kept * slopes[S_YY, SLOPE_X, i, j]
-        yy_y = kept * slopes[S_YY, SLOPE_Y, i, j]
-        xy_x = kept * slopes[S_XY, SLOPE_X, i, j]
-        xy_y = kept * slopes[S_XY, SLOPE_Y, i, j]
-        slopes[S_XX, AT_CENTRE, i, j] = mid_xx
-        slopes[S_XX, SLOPE_X, i, j] = xx_x
-        slopes[S_XX, SLOPE_Y, i, j] = xx_y
-        slopes[S_YY, AT_CENTRE, i, j] = mid_yy
-        slopes[S_YY, SLOPE_X, i, j] = yy_x
-        slopes[S_YY, SLOPE_Y, i, j] = yy_y
-        slopes[S_XY, AT_CENTRE, i, j] = mid_xy
-        slopes[S_XY, SLOPE_X, i, j] = xy_x
-        slopes[S_XY, SLOPE_Y, i, j] = xy_y
-        pull_x = xx_x + xy_y
-        pull_y = xy_x + yy_y
-        if curved:
-            y = centres[1, i, j]
-            pull_x += kept * s_xy / y
-            pull_y += kept * (s_yy - compute_hoop_stress(s_xx, s_yy)) / y
-            hoop = compute_hoop_stress(mid_xx, mid_yy)
-            arrays.hoop[0, i, j] = mid_yy - hoop
-            arrays.hoop[1, i, j] = hoop
-        arrays.pull[0, i, j] = pull_x
-        arrays.pull[1, i, j] = pull_y
+            (s_xx, s_yy, s_xy), rates, i, j, shear[i, j], flow_stress[i, j], hardening[i, j],
+            half_dt,
+        )  # fmt: skip
+        gains[S_XX, j] = new_xx - s_xx
+        gains[S_YY, j] = new_yy - s_yy
+        gains[S_XY, j] = new_xy - s_xy
+
+    @inlined
+    def find_middle(slopes, gains, i, j):
+        """Stress of a cell at mid-time."""
+        slopes[S_XX, AT_CENTRE, i, j] += gains[S_XX, j]
+        slopes[S_YY, AT_CENTRE, i, j] += gains[S_YY, j]
+        slopes[S_XY, AT_CENTRE, i, j] += gains[S_XY, j]
+
+    @inlined
+    def clear_stress(slopes, i, j):
+        """Nothing that fluids and pieces bear."""
+        for q in range(PLASTIC_STRAIN):
+            for part in range(SLOPE_PARTS):
+                slopes[q, part, i, j] = 0.0
+
+    @inlined
+    def find_pull(slopes, i, j, pull):
+        """Divergence of the stress of a cell in the plane."""
+        pull[0, i, j] = slopes[S_XX, SLOPE_X, i, j] + slopes[S_XY, SLOPE_Y, i, j]
+        pull[1, i, j] = slopes[S_XY, SLOPE_X, i, j] + slopes[S_YY, SLOPE_Y, i, j]
+
+    @inlined
+    def pull_rings(values, slopes, centres, i, j, arrays):
+        """What rings add to the divergence, and their stress at mid-time."""
+        kept = 1.0 if arrays.shear[i, j] > 0.0 else 0.0
+        s_xx = values[S_XX, i + 1, j + 1]
+        s_yy = values[S_YY, i + 1, j + 1]
+        inverse = kept / centres[1, i, j]
+        arrays.pull[0, i, j] += inverse * values[S_XY, i + 1, j + 1]
+        arrays.pull[1, i, j] += inverse * (s_yy - compute_hoop_stress(s_xx, s_yy))
+        mid_yy = slopes[S_YY, AT_CENTRE, i, j]
+        hoop = compute_hoop_stress(slopes[S_XX, AT_CENTRE, i, j], mid_yy)
+        arrays.hoop[0, i, j] = mid_yy - hoop
+        arrays.hoop[1, i, j] = hoop
 
     @compiled_once(allocates=False)
-    def predict_row(values, slopes, rates, laws, half_dt, centres, i, arrays):
-        """`predict_cell` of the cells of a row."""
+    def find_gains_of_row(values, rates, laws, half_dt, i, shear, gains):
+        for j in range(gains.shape[1]):
+            find_gains(values, rates, laws, half_dt, (i, j), shear, gains)
+
+    @compiled_once(allocates=False)
+    def find_middles_of_row(slopes, gains, i):
+        for j in range(gains.shape[1]):
+            find_middle(slopes, gains, i, j)
+
+    @compiled_once(allocates=False)
+    def clear_row(shear, slopes, i):
+        for j in range(shear.shape[1]):
+            if not shear[i, j] > 0.0:
+                clear_stress(slopes, i, j)
+
+    @compiled_once(allocates=False)
+    def find_pulls_of_row(slopes, i, pull):
+        for j in range(pull.shape[2]):
+            find_pull(slopes, i, j, pull)
+
+    @compiled_once(allocates=False)
+    def pull_rings_of_row(values, slopes, centres, i, arrays):
         for j in range(centres.shape[2]):
-            predict_cell(values, slopes, rates, laws, half_dt, centres, (i, j), arrays)
+            pull_rings(values, slopes, centres, i, j, arrays)
 
     @kernel(allocates=False)
-    def predict_stress(values, slopes, rates, laws, half_dt, centres, rows, arrays):
-        """Stress at mid-time into `slopes`, with its divergence.
+    def predict_stress(fields, rates, laws, half_dt, centres, rows, gains, arrays):
+        """Stress at mid-time into the slopes of fields, with its divergence.
 
-        values (n, ni + 2, nj + 2), slopes (n, 3, ni, nj): of the carried fields of a solid, from
-        s_xx on; laws: flow stress and hardening (ni, nj) [Pa]; centres (2, ni, nj); arrays:
-        `SolidArrays`, of which shear is known and pull and hoop are filled.
+        fields: values (n, ni + 2, nj + 2) and slopes (n, 3, ni, nj) of the carried fields of a
+        solid, from s_xx on; laws: flow stress and hardening (ni, nj) [Pa]; centres (2, ni, nj);
+        gains (3, nj): scratch; arrays: `SolidArrays`, of which shear is known and pull and hoop are
+        filled.
         """
-        ni, nj = arrays.shear.shape
+        values, slopes = fields
+        shear = arrays.shear
+        ni, nj = shear.shape
         for i in range(ni):
+            # short loops over a row, which vectorise
             if is_row_read(i, ni, rows):
-                predict_row(values, slopes, rates, laws, half_dt, centres, i, arrays)
+                find_gains_of_row(values, rates, laws, half_dt, i, shear, gains)
+                find_middles_of_row(slopes, gains, i)
+                clear_row(shear, slopes, i)
+                find_pulls_of_row(slopes, i, arrays.pull)
+                if curved:
+                    pull_rings_of_row(values, slopes, centres, i, arrays)
                 continue
             for j in (0, nj - 1):
-                predict_cell(values, slopes, rates, laws, half_dt, centres, (i, j), arrays)
+                find_gains(values, rates, laws, half_dt, (i, j), shear, gains)
+                find_middle(slopes, gains, i, j)
+                if not shear[i, j] > 0.0:
+                    clear_stress(slopes, i, j)
+                find_pull(slopes, i, j, arrays.pull)
+                if curved:
+                    pull_rings(values, slopes, centres, i, j, arrays)
 
     return predict_stress
 

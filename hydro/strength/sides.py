@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from shockgrid.hydro.carried.transport import find_value
 from shockgrid.hydro.formulas import riemann
-from shockgrid.hydro.formulas.reconstruction import limit_gently
+from shockgrid.hydro.formulas.reconstruction import compute_turn, limit_gently
 from shockgrid.hydro.formulas.strength import (
     add_shear_wave,
     compose_stress,
@@ -43,6 +43,8 @@ from shockgrid.hydro.rim import (
     ENERGY,
     HOOP,
     LENGTH,
+    LINE_X,
+    LINE_Y,
     MOMENTUM_X,
     MOMENTUM_Y,
     NX,
@@ -58,6 +60,7 @@ from shockgrid.hydro.rim import (
     RHO_TRACE,
     SWEEP,
     SWEPT,
+    TURN_GHOST,
     U_GHOST,
     U_STAR,
     U_TRACE,
@@ -384,6 +387,8 @@ def stick_together(leader, follower, pairs, phase, mass_passes, curved):
         stress, along = compute_shear_contact(
             (z, speed, stress_inside), (z_beyond, -speed_beyond, stress_beyond)
         )
+        if mass_passes and phase == AT_CELLS:
+            turn_beyond(rim, k, other_rim, m)
         sides[SHEAR_STRESS, k] = other_sides[SHEAR_STRESS, m] = stress
         sides[SPEED_ALONG, k] = along
         other_sides[SPEED_ALONG, m] = -along
@@ -398,6 +403,15 @@ def stick_together(leader, follower, pairs, phase, mass_passes, curved):
                 across = find_speed_across(rim, k, other_rim, m)
             keep_face_speed(rim, sides, k, across)
             keep_face_speed(other_rim, other_sides, m, -across)
+
+
+@inlined
+def turn_beyond(rim, k, other_rim, m):
+    """By how much the line through both cells of a seam turns; both lines go inwards."""
+    line = -rim[LINE_X, k], -rim[LINE_Y, k]
+    turn = compute_turn(line, (other_rim[LINE_X, m], other_rim[LINE_Y, m]))
+    rim[TURN_GHOST, k] = turn
+    other_rim[TURN_GHOST, m] = turn
 
 
 @inlined

@@ -37,8 +37,8 @@ from shockgrid.hydro.strength.rates import (
     PLASTIC_STRAIN,
     RATE_ROWS,
     make_fill_face_stress,
+    make_fill_rates,
     make_measure_rates,
-    make_predict_rates,
     make_predict_stress,
     update_stress,
 )
@@ -119,6 +119,7 @@ class Stress:
         self._states_at_start: tuple = ()  # from the phase `start` to `predict`
         self.arrays = make_solid_arrays(ni, nj)
         self.rates = np.zeros((RATE_ROWS, ni, nj))
+        self.gains = np.zeros((PLASTIC_STRAIN, nj))  # scratch of a row
         self.sides = np.zeros((SIDE_ROWS, 2 * (ni + nj)))
         # increase of the plastic strain in a step, for a law of spall
         self.strained = np.zeros((ni, nj) if spall is not None else (1, 1))
@@ -148,21 +149,13 @@ class Stress:
         fill_stress_ghosts(
             arrays.shear, block.plan.flowing_spans, self.FIRST_FIELD, self.sides, block.rim.rows
         )
-        transport.predict(block, half_dt)
-        predict_rates = make_predict_rates(block.geometry)
-        predict_rates(
-            block.start,
-            block.rim.rows,
-            block.nodes,
-            (transport.measures, transport.centres),
-            rows,
-            self.rates,
-        )
+        transport.predict(block, half_dt, make_fill_rates(block.geometry), self.rates)
         laws = self._find_laws(self._states_at_start, values)
         predict_stress = make_predict_stress(block.geometry)
         predict_stress(
-            values, transport.slopes, self.rates, laws, half_dt, transport.centres, rows, arrays
-        )
+            (values, transport.slopes), self.rates, laws, half_dt, transport.centres, rows,
+            self.gains, arrays,
+        )  # fmt: skip
 
     def trace_moving(self, block: Any) -> None:
         """Phase 2, at the end: the traces at faces that go with the flow."""

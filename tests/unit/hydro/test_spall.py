@@ -24,6 +24,7 @@ from shockgrid.hydro.strength.spall import (
 )
 from shockgrid.hydro.strength.spall.base import compute_greatest_tension
 from shockgrid.regrid.errors import BadInput
+from shockgrid.testing import check_spall
 
 COPPER = MieGruneisen(8930.0, 3940.0, 1.489, 1.99, 1e10)
 LAWS = {
@@ -69,6 +70,56 @@ def test_compression_is_left_alone_and_tension_is_never_raised(kind):
     assert np.all(found >= cells.pressure)
     assert np.all(found[2:] <= 0.0)
     assert not law.find_broken(values)[0]
+
+
+@pytest.mark.parametrize("kind", SPALL_LAWS)
+def test_laws_pass_their_checks(kind):
+    check_spall(LAWS[kind])
+
+
+class Spoiled(ConstantSpall):
+    """A law with a mistake."""
+
+    broken = ""
+
+    def relax(self, values, cells, dt):
+        if self.broken == "writes":
+            cells.strained[:] += 1.0
+        found = super().relax(values, cells, dt)
+        if self.broken == "shape":
+            return found[:1]
+        if self.broken == "pulls":
+            return np.where(cells.pressure < -1e9, cells.pressure, found)
+        if self.broken == "presses":
+            return found + 1.0
+        if self.broken == "stretches":
+            return found - 1.0
+        if self.broken == "neighbours":
+            places = np.arange(values[0].size).reshape(values[0].shape)
+            values[0] += 0.1 * places / places.size
+        if self.broken == "heat":
+            values[0] += 0.0 if cells.temperature is None else 0.1
+        return found
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        ("writes", "relax writes its cells"),
+        ("shape", r"relax gives the shape \(1,\) for"),
+        ("pulls", "a broken cell bears tension at"),
+        ("presses", "relax changes a pressure at a whole pressure of"),
+        ("stretches", "relax gives more tension than whole material has at"),
+        ("neighbours", "what it does to a cell depends on other cells"),
+        ("heat", "it depends on the temperature"),
+    ],
+)
+def test_mistakes_of_laws_are_found(broken, words):
+    law = type("Broken", (Spoiled,), {"broken": broken})(1.2e9)
+    globals()["Broken"] = type(law)
+    type(law).__module__ = __name__
+    with pytest.raises(AssertionError, match=f"law of spall constant: {words}"):
+        check_spall(law)
 
 
 def test_constant_counts_the_deviator():

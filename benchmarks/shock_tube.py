@@ -27,10 +27,15 @@ from typing import Any
 import numpy as np
 
 import shockgrid as sg
+from shockgrid.problems.pictures import find_dump
 
 HERE = Path(__file__).resolve().parent
 POINTS = HERE / "shock_tube_points.csv"
 PICTURE = HERE.parent / "docs" / "pictures" / "shock-tube.png"
+FIELDS_PICTURE = PICTURE.with_name("shock-tube-59.png")
+SHOWN = "jacobs-krivets-59"  # whose density is drawn, at these times after the shock [s]
+SHOWN_TIMES = (0.7e-3, 1.8e-3, 2.7e-3, 4.0e-3, 5.9e-3)
+SHOWN_EXTENT = -0.052, 0.03  # along the tube from the mean interface [m]
 EARLY = 0.5  # k v0 t to which straight lines are fitted for the rate v0
 PASSAGE = 0.1  # k v0 t in which the amplitude is least: that is a0+
 LEAST_TIME = 0.1  # k v0 t from which on deviations are counted: before, they are of a0+ alone
@@ -222,6 +227,35 @@ def draw(curves: Mapping[str, Curve], points: Mapping[str, np.ndarray]) -> None:
     figure.savefig(PICTURE, dpi=110)
 
 
+def draw_fields(run: Any) -> None:
+    """Density of one and a half waves, the width of the tube, which runs down the page."""
+    import matplotlib.pyplot as plt
+
+    problem = load(next(one for one in EXPERIMENTS if one.name == SHOWN))
+    wavelength = problem.deck.wavelength
+    figure, panels = plt.subplots(
+        1, len(SHOWN_TIMES), figsize=(11, 2.6), layout="constrained", sharey=True
+    )
+    for axes, t in zip(panels, SHOWN_TIMES, strict=True):
+        dump = find_dump(run, t + problem.arrival)
+        mean = float(np.interp(dump.t, run.history.t, run.history.interface_mean))
+        for block in dump.blocks:
+            x, y = block.nodes
+            rho = block.cell_fields["rho"]
+            # the half wave that is computed, and its mirror images
+            for across in (y, wavelength - y, wavelength + y):
+                shown = axes.pcolormesh(
+                    1e3 * across, 1e3 * (x - mean), rho, cmap="YlGnBu", vmin=1.5, vmax=13.0,
+                    rasterized=True,
+                )  # fmt: skip
+        high, low = (1e3 * end for end in SHOWN_EXTENT)
+        axes.set(aspect="equal", ylim=(low, high), xlabel="mm")
+        axes.set_title(f"{1e3 * (dump.t - problem.arrival):.1f} ms", fontsize="medium")
+    panels[0].set_ylabel("mm from the mean interface")
+    figure.colorbar(shown, ax=panels, label="density [kg/m³]", pad=0.01)
+    figure.savefig(FIELDS_PICTURE, dpi=110)
+
+
 def main() -> None:
     """Print the tables; with --json write them, and draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -264,6 +298,7 @@ def compare_all(options: argparse.Namespace, runs: Path) -> None:
         document = {name: {"command": command, "rows": rows} for name, rows in tables.items()}
         options.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
         draw(finest, points)
+        draw_fields(sg.open(runs / f"{SHOWN}-{max(options.cells)}"))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from shockgrid.regrid.errors import BadInput
 from shockgrid.regrid.text_files import read_text
 
 WORDS_A_LINE = 5
+COMMENT_CHARACTERS = 80  # of a comment in a line
 WORD_WIDTHS = (15, 22)  # characters of single and of double precision
 GENERAL_RECORD = 201
 TOTAL_RECORD = 301
@@ -92,7 +93,7 @@ def _read_record(
         ) from None
     at += 1
     if record in COMMENT_RECORDS:
-        return at + -(-count // 80), material, record, None
+        return at + -(-count // COMMENT_CHARACTERS), material, record, None
     rows = -(-count // WORDS_A_LINE)
     if at + rows > len(lines):
         raise BadInput(f"{path}: record {record} of material {material} is cut off")

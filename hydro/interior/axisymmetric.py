@@ -81,8 +81,8 @@ def fill_lines(Z, n):
     """Lines through the centres of volume, and 1/area between them."""
     for k in range(1, n + 1):
         a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
-        mid_i = Z[scratch.MI_X + k], Z[scratch.MI_Y + k]
-        mid_j = Z[scratch.MJ_X + k], Z[scratch.MJ_Y + k]
+        mid_i = Z[scratch.MID_I_X + k], Z[scratch.MID_I_Y + k]
+        mid_j = Z[scratch.MID_J_X + k], Z[scratch.MID_J_Y + k]
         twist, middle = find_even_twist(a, b, c, d)
         line_i, line_j = lean_lines(mid_i, mid_j, twist, middle)
         scratch.store_vector(Z, scratch.LEAN_I, k, line_i)

@@ -56,12 +56,14 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
     """
 
     @inlined
-    def trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters):
+    def trace(cell, dx, dy, parameters):
         """State (rho, u, v, p) and c² at an offset; no state of the material: the cell's own.
 
-        c² is that of the cell if it has failed (`hydro.formulas.reconstruction.mark_voided`).  The
-        last number is 1 where the cell's own state is taken, else 0.
+        cell: of `load_predicted`.  c² is that of the cell if it has failed
+        (`hydro.formulas.reconstruction.mark_voided`).  The last number is 1 where the cell's own
+        state is taken, else 0.
         """
+        half, gradients, of_cell, voided_energy, shear_wave = cell
         rho, u, v, p = compute_face_state(half, gradients, dx, dy)
         rho_of_cell, u_of_cell, v_of_cell, p_of_cell, c2_of_cell = of_cell
         c2 = sound_speed_squared_part(rho, p, parameters)
@@ -82,42 +84,40 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
         )
 
     @inlined
-    def load(Z, k):
-        """What is traced: predicted state, gradients, own state and c², energy if the cell
-        has failed (else WHOLE_CELL_MARK), what shear adds to c², centre."""
-        return (
-            (
-                Z[scratch.RHO_HALF + k],
-                Z[scratch.U_HALF + k],
-                Z[scratch.V_HALF + k],
-                Z[scratch.P_HALF + k],
-            ),
-            (
-                Z[scratch.RHO_X + k],
-                Z[scratch.RHO_Y + k],
-                Z[scratch.U_X + k],
-                Z[scratch.U_Y + k],
-                Z[scratch.V_X + k],
-                Z[scratch.V_Y + k],
-                Z[scratch.P_X + k],
-                Z[scratch.P_Y + k],
-            ),
-            (
-                Z[scratch.RHO + k],
-                Z[scratch.U + k],
-                Z[scratch.V + k],
-                Z[scratch.P + k],
-                Z[scratch.C2 + k],
-            ),
-            Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK,
-            Z[scratch.SHEAR_WAVE + k] if is_solid else 0.0,
-            Z[scratch.X_CENTRE + k],
-            Z[scratch.Y_CENTRE + k],
+    def load_predicted(Z, k):
+        """Cell k for `trace`: predicted state, gradients, own state and c², energy if it has failed
+        (else WHOLE_CELL_MARK), what shear adds to c²; and x and y of its centre."""
+        half = (
+            Z[scratch.RHO_HALF + k],
+            Z[scratch.U_HALF + k],
+            Z[scratch.V_HALF + k],
+            Z[scratch.P_HALF + k],
         )
+        gradients = (
+            Z[scratch.RHO_X + k],
+            Z[scratch.RHO_Y + k],
+            Z[scratch.U_X + k],
+            Z[scratch.U_Y + k],
+            Z[scratch.V_X + k],
+            Z[scratch.V_Y + k],
+            Z[scratch.P_X + k],
+            Z[scratch.P_Y + k],
+        )
+        of_cell = (
+            Z[scratch.RHO + k],
+            Z[scratch.U + k],
+            Z[scratch.V + k],
+            Z[scratch.P + k],
+            Z[scratch.C2 + k],
+        )
+        voided_energy = Z[scratch.VOIDED_ENERGY + k] if opens_voids else WHOLE_CELL_MARK
+        shear_wave = Z[scratch.SHEAR_WAVE + k] if is_solid else 0.0
+        cell = half, gradients, of_cell, voided_energy, shear_wave
+        return cell, Z[scratch.X_CENTRE + k], Z[scratch.Y_CENTRE + k]
 
     @inlined
-    def put(Z, rows, k, traced):
-        """A traced state into its rows; 1 where it is the cell's own."""
+    def store_trace(Z, rows, k, traced):
+        """Store a traced state in its rows; 1 where it is the cell's own."""
         rho, u, v, p, c2 = rows
         Z[rho + k], Z[u + k], Z[v + k], Z[p + k], Z[c2 + k], fell_back = traced
         return fell_back
@@ -126,30 +126,26 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
     def fill_traces_in(Z, n, counted, parameters):
         """Traces towards -i; `counted`: 1 where the row is the tile's (fallbacks count), else 0."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, shear_wave, x, y = load(Z, k)
-            dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
-            inwards = trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters)
-            fell_back = put(Z, scratch.IN, k, inwards)
+            cell, centre_x, centre_y = load_predicted(Z, k)
+            dx, dy = Z[scratch.X_I + k] - centre_x, Z[scratch.Y_I + k] - centre_y
+            inwards = trace(cell, dx, dy, parameters)
+            fell_back = store_trace(Z, scratch.TRACE_IN, k, inwards)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     @compiled_once(allocates=False)
     def fill_traces(Z, n, counted, parameters):
         """Traces towards +i, -j and +j; the faces towards +i must have taken their place."""
         for k in range(1, n + 1):
-            half, gradients, of_cell, voided_energy, shear_wave, x, y = load(Z, k)
-            dx, dy = Z[scratch.X_I + k] - x, Z[scratch.Y_I + k] - y
-            down_dx, down_dy = Z[scratch.X_J + k] - x, Z[scratch.Y_J + k] - y
-            up_dx, up_dy = Z[scratch.X_J + k + 1] - x, Z[scratch.Y_J + k + 1] - y
-            out = trace(half, gradients, of_cell, voided_energy, shear_wave, dx, dy, parameters)
-            fell_back = put(Z, scratch.OUT, k, out)
-            down = trace(
-                half, gradients, of_cell, voided_energy, shear_wave, down_dx, down_dy, parameters
-            )
-            fell_back += put(Z, scratch.DOWN, k, down)
-            up = trace(
-                half, gradients, of_cell, voided_energy, shear_wave, up_dx, up_dy, parameters
-            )
-            fell_back += put(Z, scratch.UP, k, up)
+            cell, centre_x, centre_y = load_predicted(Z, k)
+            dx, dy = Z[scratch.X_I + k] - centre_x, Z[scratch.Y_I + k] - centre_y
+            down_dx, down_dy = Z[scratch.X_J + k] - centre_x, Z[scratch.Y_J + k] - centre_y
+            up_dx, up_dy = Z[scratch.X_J + k + 1] - centre_x, Z[scratch.Y_J + k + 1] - centre_y
+            out = trace(cell, dx, dy, parameters)
+            fell_back = store_trace(Z, scratch.TRACE_OUT, k, out)
+            down = trace(cell, down_dx, down_dy, parameters)
+            fell_back += store_trace(Z, scratch.TRACE_DOWN, k, down)
+            up = trace(cell, up_dx, up_dy, parameters)
+            fell_back += store_trace(Z, scratch.TRACE_UP, k, up)
             Z[scratch.FIRST_ORDER + k] += counted * fell_back
 
     return fill_traces_in, fill_traces

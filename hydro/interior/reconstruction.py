@@ -124,8 +124,8 @@ def make_geometry(compute_volume):
         for k in range(1, n + 1):
             a, b, c, d = scratch.load_corners(Z, scratch.LOW, scratch.HIGH, k)
             mid_i, mid_j, area = compute_line_geometry(a, b, c, d)
-            scratch.store_vector(Z, scratch.MI, k, mid_i)
-            scratch.store_vector(Z, scratch.MJ, k, mid_j)
+            scratch.store_vector(Z, scratch.MID_I, k, mid_i)
+            scratch.store_vector(Z, scratch.MID_J, k, mid_j)
             twist, y = scratch.find_twist(a, b, c, d)
             Z[scratch.VOLUME + k] = compute_volume(area, mid_i, mid_j, twist, y)
 

@@ -61,7 +61,7 @@ LENGTH_BEFORE, LENGTH, LENGTH_AFTER, LENGTH_J = _rows(4)
 OFFSET_X, OFFSET_Y, OFFSET_X_AFTER, OFFSET_Y_AFTER = _rows(4)
 SHIFT_BEFORE, SHIFT, SHIFT_AFTER, SHIFT_J, SHIFT_J_AFTER = _rows(5)  # ordered as the lengths
 # the two line vectors, volume, squared sound speed, energy, HLL switch (and the last row's)
-MI_X, MI_Y, MJ_X, MJ_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
+MID_I_X, MID_I_Y, MID_J_X, MID_J_Y, VOLUME, C2, E, HLL, HLL_BEFORE = _rows(9)
 # void energies of this row's cells; energies of failed cells of this row and the row before
 VOID_LOADED, VOIDED_ENERGY, VOIDED_ENERGY_BEFORE = _rows(3)
 # degree to which the motion of the cells is waves: this row, the row before
@@ -76,10 +76,10 @@ AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
 PUSH, DRAG, SQUARE, VOIDED_ENERGY_SIDE = _rows(4)
 # traces at the faces of the row, rho, u, v, p and c²: towards -i, +i, -j, +j
-IN = RHO_IN, *_ = _rows(5)
-OUT = RHO_OUT, *_ = _rows(5)
-DOWN = RHO_DOWN, *_ = _rows(5)
-UP = RHO_UP, *_ = _rows(5)
+TRACE_IN = RHO_IN, *_ = _rows(5)
+TRACE_OUT = RHO_OUT, *_ = _rows(5)
+TRACE_DOWN = RHO_DOWN, *_ = _rows(5)
+TRACE_UP = RHO_UP, *_ = _rows(5)
 # fluxes through the faces towards -i and -j; conserved quantities waiting for the next i face
 FLUX_I_MASS, FLUX_I_X, FLUX_I_Y, FLUX_I_ENERGY, PUSH_I, HOOP_I = _rows(6)
 FLUX_J_MASS, FLUX_J_X, FLUX_J_Y, FLUX_J_ENERGY, PUSH_J, HOOP_J = _rows(6)
@@ -90,7 +90,7 @@ MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY = _rows(4)
 SMOOTH, SOURCE_P, LEVER, SHARE = _rows(4)
 # axisymmetric: lines through the centres of volume, 1/area between them
 LEAN_I_X, LEAN_I_Y, LEAN_J_X, LEAN_J_Y, LEAN_INVERSE = _rows(5)
-MI_X_NEW, MI_Y_NEW, MJ_X_NEW, MJ_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
+MID_I_X_NEW, MID_I_Y_NEW, MID_J_X_NEW, MID_J_Y_NEW, VOLUME_NEW, W_X, W_Y = _rows(7)
 # the new state, rate and crowding of the finished row
 RHO_NEW, U_NEW, V_NEW, P_NEW, VOID_NEW, RATE_NEW, CROWDING_NEW = _rows(7)
 # running extremes and sums over the rows of a tile
@@ -136,10 +136,10 @@ HIGH = (X_HIGH, Y_HIGH)
 NEXT = (X_NEXT, Y_NEXT)
 LOW_NEW = (X_LOW_NEW, Y_LOW_NEW)
 HIGH_NEW = (X_HIGH_NEW, Y_HIGH_NEW)
-MI = (MI_X, MI_Y)
-MJ = (MJ_X, MJ_Y)
-MI_NEW = (MI_X_NEW, MI_Y_NEW)
-MJ_NEW = (MJ_X_NEW, MJ_Y_NEW)
+MID_I = (MID_I_X, MID_I_Y)
+MID_J = (MID_J_X, MID_J_Y)
+MID_I_NEW = (MID_I_X_NEW, MID_I_Y_NEW)
+MID_J_NEW = (MID_J_X_NEW, MID_J_Y_NEW)
 LEAN_I = (LEAN_I_X, LEAN_I_Y)
 LEAN_J = (LEAN_J_X, LEAN_J_Y)
 

@@ -95,10 +95,10 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                 Z[scratch.V_NEW + k] = v
                 Z[scratch.P_NEW + k] = p
                 # rate and crowding in the new cell (theory F7.1, F7.3)
-                mid_i_x = Z[scratch.MI_X_NEW + k]
-                mid_i_y = Z[scratch.MI_Y_NEW + k]
-                mid_j_x = Z[scratch.MJ_X_NEW + k]
-                mid_j_y = Z[scratch.MJ_Y_NEW + k]
+                mid_i_x = Z[scratch.MID_I_X_NEW + k]
+                mid_i_y = Z[scratch.MID_I_Y_NEW + k]
+                mid_j_x = Z[scratch.MID_J_X_NEW + k]
+                mid_j_y = Z[scratch.MID_J_Y_NEW + k]
                 inverse_area = inverse_volume
                 if curved:
                     inverse_area = 1.0 / (mid_i_x * mid_j_y - mid_i_y * mid_j_x)
@@ -172,8 +172,8 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                         (Z[scratch.HOOP_J + k + 1] - Z[scratch.HOOP_J + k]) - Z[scratch.HOOP_I + k],
                     )
                     lines = (
-                        (Z[scratch.MI_X + k], Z[scratch.MI_Y + k]),
-                        (Z[scratch.MJ_X + k], Z[scratch.MJ_Y + k]),
+                        (Z[scratch.MID_I_X + k], Z[scratch.MID_I_Y + k]),
+                        (Z[scratch.MID_J_X + k], Z[scratch.MID_J_Y + k]),
                     )
                     push = dt * share * Z[scratch.SOURCE_P + k]
                     if is_solid:
@@ -184,8 +184,8 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                     Z[scratch.LEVER + k] = lever
                     Z[scratch.SHARE + k] = share
                 Z[scratch.MOMENTUM_Y + k] = momentum_y
-                scratch.store_vector(Z, scratch.MI_NEW, k, mid_i)
-                scratch.store_vector(Z, scratch.MJ_NEW, k, mid_j)
+                scratch.store_vector(Z, scratch.MID_I_NEW, k, mid_i)
+                scratch.store_vector(Z, scratch.MID_J_NEW, k, mid_j)
                 Z[scratch.VOLUME_NEW + k] = compute_volume(area, mid_i, mid_j, twist, y_new)
                 xa, ya = a
                 xb, yb = b

@@ -41,7 +41,9 @@ from shockgrid.regrid.measure.quality import (
 )
 from shockgrid.regrid.protocol import RegridReport, RegridResult
 
-A, B, AX, AY, BX, BY = range(6)  # rows of the fluxes: w g22, w g11, their products with d1, d2
+COEFFICIENT_I, COEFFICIENT_J, FLUX_I_X, FLUX_I_Y, FLUX_J_X, FLUX_J_Y = range(
+    6
+)  # rows of the fluxes: w g22, w g11, their products with d1, d2
 SCALE, ALONG_I, ALONG_J = range(3)  # rows of the nodes' coefficients
 SMALLEST_TAU = 1.0  # for two-cell modes; the largest, for the block's modes, follows from its size
 LEAST_CYCLED_TAU = 0.25  # of a step, however often tau has been lowered
@@ -80,12 +82,12 @@ def fill_cell_fluxes(nodes, weight, out, products):
             d2x, d2y = 0.5 * (rising_x - falling_x), 0.5 * (rising_y - falling_y)
             a = weight[i, j] * (d2x * d2x + d2y * d2y)
             b = weight[i, j] * (d1x * d1x + d1y * d1y)
-            out[A, i, j] = a
-            out[B, i, j] = b
-            out[AX, i, j] = a * d1x
-            out[AY, i, j] = a * d1y
-            out[BX, i, j] = b * d2x
-            out[BY, i, j] = b * d2y
+            out[COEFFICIENT_I, i, j] = a
+            out[COEFFICIENT_J, i, j] = b
+            out[FLUX_I_X, i, j] = a * d1x
+            out[FLUX_I_Y, i, j] = a * d1y
+            out[FLUX_J_X, i, j] = b * d2x
+            out[FLUX_J_Y, i, j] = b * d2y
             products[i, j] = weight[i, j] * (d1x * d2y - d1y * d2x)
 
 
@@ -101,26 +103,30 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
     # coefficients of edges along i, then along j
     for i in range(ni):
         for j in range(nj - 1):
-            coefficients[ALONG_I, i, j] = 0.5 * (flux[A, i, j] + flux[A, i, j + 1])
+            coefficients[ALONG_I, i, j] = 0.5 * (
+                flux[COEFFICIENT_I, i, j] + flux[COEFFICIENT_I, i, j + 1]
+            )
     for i in range(ni - 1):
         for j in range(nj):
-            coefficients[ALONG_J, i, j] = 0.5 * (flux[B, i, j] + flux[B, i + 1, j])
+            coefficients[ALONG_J, i, j] = 0.5 * (
+                flux[COEFFICIENT_J, i, j] + flux[COEFFICIENT_J, i + 1, j]
+            )
     for i in range(ni - 1):
         for j in range(nj - 1):
             # scale C of a node, from its four cells
-            low_a = flux[A, i, j] + flux[A, i, j + 1]
-            low_b = flux[B, i, j] + flux[B, i, j + 1]
-            high_a = flux[A, i + 1, j] + flux[A, i + 1, j + 1]
-            high_b = flux[B, i + 1, j] + flux[B, i + 1, j + 1]
+            low_a = flux[COEFFICIENT_I, i, j] + flux[COEFFICIENT_I, i, j + 1]
+            low_b = flux[COEFFICIENT_J, i, j] + flux[COEFFICIENT_J, i, j + 1]
+            high_a = flux[COEFFICIENT_I, i + 1, j] + flux[COEFFICIENT_I, i + 1, j + 1]
+            high_b = flux[COEFFICIENT_J, i + 1, j] + flux[COEFFICIENT_J, i + 1, j + 1]
             coefficients[SCALE, i, j] = 0.125 * ((low_a + high_a) + (low_b + high_b))
         # residual (R10.3)
         for k in range(2):
             for j in range(nj - 1):
-                along = (flux[AX + k, i + 1, j] + flux[AX + k, i + 1, j + 1]) - (
-                    flux[AX + k, i, j] + flux[AX + k, i, j + 1]
+                along = (flux[FLUX_I_X + k, i + 1, j] + flux[FLUX_I_X + k, i + 1, j + 1]) - (
+                    flux[FLUX_I_X + k, i, j] + flux[FLUX_I_X + k, i, j + 1]
                 )
-                across = (flux[BX + k, i, j + 1] + flux[BX + k, i + 1, j + 1]) - (
-                    flux[BX + k, i, j] + flux[BX + k, i + 1, j]
+                across = (flux[FLUX_J_X + k, i, j + 1] + flux[FLUX_J_X + k, i + 1, j + 1]) - (
+                    flux[FLUX_J_X + k, i, j] + flux[FLUX_J_X + k, i + 1, j]
                 )
                 residual[k, i, j] = 0.5 * (along + across)
         # squares of the row, for the relative residual
@@ -128,8 +134,8 @@ def fill_nodes_equation(flux, residual, coefficients, sums):
         flux_squares = 0.0
         for j in range(nj - 1):
             size += residual[0, i, j] ** 2 + residual[1, i, j] ** 2
-            flux_squares += flux[AX, i, j] ** 2 + flux[AY, i, j] ** 2
-            flux_squares += flux[BX, i, j] ** 2 + flux[BY, i, j] ** 2
+            flux_squares += flux[FLUX_I_X, i, j] ** 2 + flux[FLUX_I_Y, i, j] ** 2
+            flux_squares += flux[FLUX_J_X, i, j] ** 2 + flux[FLUX_J_Y, i, j] ** 2
         sums[0, i] = size
         sums[1, i] = flux_squares
 
@@ -293,7 +299,7 @@ def choose_taus(operator: Ed2Operator) -> np.ndarray:
     share; tau covers the range of their inverses in factors of four.
     """
     n = min(operator.shape)
-    share = 0.5 * operator.flux[: B + 1].sum(axis=(1, 2))
+    share = 0.5 * operator.flux[: COEFFICIENT_J + 1].sum(axis=(1, 2))
     weak = max(float(share.min() / share.sum()), LEAST_DIRECTION_SHARE)
     return make_cycle(1.0 / (weak * (np.pi / n) ** 2))
 

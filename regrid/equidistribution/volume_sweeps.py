@@ -18,9 +18,18 @@ LONGEST_VOLUME_ROW = 512
 # Rows of the scratch: differences of x, y, z along the three directions at cell centres; three
 # coefficients; w J; sums over neighbours along k of this row of cells, also of the first two
 # coefficients; the same for the row before, and the third coefficient there.
-D, A, WV, K, KA, L, LA, LC = (k * VOLUME_SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
+(
+    DIFFERENCES,
+    COEFFICIENTS,
+    WEIGHTED_VOLUME,
+    FLUX_SUMS,
+    COEFFICIENT_SUMS,
+    FLUX_SUMS_BEFORE,
+    COEFFICIENT_SUMS_BEFORE,
+    THIRD_COEFFICIENT_BEFORE,
+) = (k * VOLUME_SPAN for k in (0, 9, 12, 13, 22, 24, 33, 35))
 VOLUME_SCRATCH = 36 * VOLUME_SPAN
-# in the rows of K and L, from those of the first direction to those of the others
+# from the rows of FLUX_SUMS, or of those before, of the first direction to those of the others
 SECOND_DIRECTION = 3 * VOLUME_SPAN
 THIRD_DIRECTION = 6 * VOLUME_SPAN
 # rows of a plane's lines along k, transposed, after the right-hand sides
@@ -50,35 +59,51 @@ def difference_row(x, i, j, n, Z, start):
 def weigh_row(weight, n, Z):
     """Coefficients w g22 g33, w g11 g33, w g11 g22 and w J along a row of cells."""
     for k in range(n):
-        a = (Z[D + k], Z[D + VOLUME_SPAN + k], Z[D + 2 * VOLUME_SPAN + k])
-        b = (Z[D + 3 * VOLUME_SPAN + k], Z[D + 4 * VOLUME_SPAN + k], Z[D + 5 * VOLUME_SPAN + k])
-        c = (Z[D + 6 * VOLUME_SPAN + k], Z[D + 7 * VOLUME_SPAN + k], Z[D + 8 * VOLUME_SPAN + k])
+        a = (
+            Z[DIFFERENCES + k],
+            Z[DIFFERENCES + VOLUME_SPAN + k],
+            Z[DIFFERENCES + 2 * VOLUME_SPAN + k],
+        )
+        b = (
+            Z[DIFFERENCES + 3 * VOLUME_SPAN + k],
+            Z[DIFFERENCES + 4 * VOLUME_SPAN + k],
+            Z[DIFFERENCES + 5 * VOLUME_SPAN + k],
+        )
+        c = (
+            Z[DIFFERENCES + 6 * VOLUME_SPAN + k],
+            Z[DIFFERENCES + 7 * VOLUME_SPAN + k],
+            Z[DIFFERENCES + 8 * VOLUME_SPAN + k],
+        )
         g11 = dot(a, a)
         g22 = dot(b, b)
         g33 = dot(c, c)
         cell_weight = weight[k]
-        Z[A + k] = cell_weight * (g22 * g33)
-        Z[A + VOLUME_SPAN + k] = cell_weight * (g11 * g33)
-        Z[A + 2 * VOLUME_SPAN + k] = cell_weight * (g11 * g22)
-        Z[WV + k] = cell_weight * dot(a, cross(b, c))
+        Z[COEFFICIENTS + k] = cell_weight * (g22 * g33)
+        Z[COEFFICIENTS + VOLUME_SPAN + k] = cell_weight * (g11 * g33)
+        Z[COEFFICIENTS + 2 * VOLUME_SPAN + k] = cell_weight * (g11 * g22)
+        Z[WEIGHTED_VOLUME + k] = cell_weight * dot(a, cross(b, c))
 
 
 @inlined
 def sum_row(n, Z):
     """Sums (along k, differences) over neighbours along k, at inner nodes 1..n-1 in 0..n-2."""
     for direction in range(3):
-        factor = A + direction * VOLUME_SPAN
+        factor = COEFFICIENTS + direction * VOLUME_SPAN
         sign = -1.0 if direction == 2 else 1.0
         a = Z[factor : factor + n]
         for row in range(
             3 * direction * VOLUME_SPAN, 3 * (direction + 1) * VOLUME_SPAN, VOLUME_SPAN
         ):
-            d = Z[D + row : D + row + n]
-            total = Z[K + row : K + row + n]
+            d = Z[DIFFERENCES + row : DIFFERENCES + row + n]
+            total = Z[FLUX_SUMS + row : FLUX_SUMS + row + n]
             for k in range(n - 1):
                 total[k] = a[k + 1] * d[k + 1] + sign * (a[k] * d[k])
         if direction < 2:
-            total = Z[KA + direction * VOLUME_SPAN : KA + direction * VOLUME_SPAN + n]
+            total = Z[
+                COEFFICIENT_SUMS + direction * VOLUME_SPAN : COEFFICIENT_SUMS
+                + direction * VOLUME_SPAN
+                + n
+            ]
             for k in range(n - 1):
                 total[k] = a[k] + a[k + 1]
 
@@ -89,10 +114,12 @@ def scatter_row(adds_to_lower, stores_in_upper, lower, upper, n, Z, component):
 
     component: VOLUME_SPAN times the number of the coordinate, 0 to 2.
     """
+    this = FLUX_SUMS + component
+    before = FLUX_SUMS_BEFORE + component
     for k in range(n - 1):
-        across = Z[K + SECOND_DIRECTION + component + k] - Z[L + SECOND_DIRECTION + component + k]
-        across += Z[K + THIRD_DIRECTION + component + k] + Z[L + THIRD_DIRECTION + component + k]
-        along = Z[K + component + k] + Z[L + component + k]
+        across = Z[this + SECOND_DIRECTION + k] - Z[before + SECOND_DIRECTION + k]
+        across += Z[this + THIRD_DIRECTION + k] + Z[before + THIRD_DIRECTION + k]
+        along = Z[this + k] + Z[before + k]
         if adds_to_lower:
             lower[k] += 0.25 * (across + along)
         if stores_in_upper:
@@ -126,14 +153,14 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
         low, high = max(i - 1, 0), min(i, n1 - 2)
         for j in range(n2):
             for c in range(3):
-                difference_row(nodes[c], i, j, n, Z, D + c * VOLUME_SPAN)
+                difference_row(nodes[c], i, j, n, Z, DIFFERENCES + c * VOLUME_SPAN)
             weigh_row(weight[i, j], n, Z)
             sum_row(n, Z)
             if is_own_row:
                 row = products[i, j]
                 for k in range(n):
-                    row[k] = Z[WV + k]
-            total = Z[KA + VOLUME_SPAN : KA + 2 * VOLUME_SPAN]
+                    row[k] = Z[WEIGHTED_VOLUME + k]
+            total = Z[COEFFICIENT_SUMS + VOLUME_SPAN : COEFFICIENT_SUMS + 2 * VOLUME_SPAN]
             for k in range(n - 1):
                 if adds_to_lower:
                     e2[low, j, k] += 0.25 * total[k]
@@ -141,20 +168,36 @@ def assemble_planes(nodes, weight, residual, edges, products, first, last, Z):
                     e2[high, j, k] = 0.25 * total[k]
             if j > 0:
                 if is_own_row:
-                    scatter_edges(False, True, e1[i, j - 1], e1[i, j - 1], n - 1, Z, KA, LA)
+                    scatter_edges(
+                        False,
+                        True,
+                        e1[i, j - 1],
+                        e1[i, j - 1],
+                        n - 1,
+                        Z,
+                        COEFFICIENT_SUMS,
+                        COEFFICIENT_SUMS_BEFORE,
+                    )
                 lower, upper = e3[low, j - 1], e3[high, j - 1]
                 scatter_edges(
-                    adds_to_lower, stores_in_upper, lower, upper, n, Z, A + 2 * VOLUME_SPAN, LC
+                    adds_to_lower,
+                    stores_in_upper,
+                    lower,
+                    upper,
+                    n,
+                    Z,
+                    COEFFICIENTS + 2 * VOLUME_SPAN,
+                    THIRD_COEFFICIENT_BEFORE,
                 )
                 for c in range(3):
                     lower, upper = residual[c, low, j - 1], residual[c, high, j - 1]
                     scatter_row(adds_to_lower, stores_in_upper, lower, upper, n, Z, c * VOLUME_SPAN)
             # this row's sums become those of the previous row
-            for offset in range(0, L - K, VOLUME_SPAN):
+            for offset in range(0, FLUX_SUMS_BEFORE - FLUX_SUMS, VOLUME_SPAN):
                 for k in range(n):
-                    Z[L + offset + k] = Z[K + offset + k]
+                    Z[FLUX_SUMS_BEFORE + offset + k] = Z[FLUX_SUMS + offset + k]
             for k in range(n):
-                Z[LC + k] = Z[A + 2 * VOLUME_SPAN + k]
+                Z[THIRD_COEFFICIENT_BEFORE + k] = Z[COEFFICIENTS + 2 * VOLUME_SPAN + k]
 
 
 @inlined

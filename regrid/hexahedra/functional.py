@@ -56,19 +56,31 @@ EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),
 )  # fmt: skip
 # Edges and forces by name: two along i, two along j, four along k; forces of the corners c = 1.
-I0, I1, J0, J1, K0, K1, K2, K3 = (EDGE + k * EDGE_SPAN for k in range(8))
-FI0, FI1, FJ0, FJ1, FK0, FK1, FK2, FK3 = (FLUX_ROW + k * EDGE_SPAN for k in range(8))
-HI0, HI1, HJ0, HJ1 = (HIGH_ROW + k * EDGE_SPAN for k in range(4))
-VI0, VI1, VJ0, VJ1, VK0, VK1, VK2, VK3 = (INVERSE + k * HEXAHEDRON_SPAN for k in range(8))
+EDGE_I0, EDGE_I1, EDGE_J0, EDGE_J1, EDGE_K0, EDGE_K1, EDGE_K2, EDGE_K3 = (
+    EDGE + k * EDGE_SPAN for k in range(8)
+)
+FORCE_I0, FORCE_I1, FORCE_J0, FORCE_J1, FORCE_K0, FORCE_K1, FORCE_K2, FORCE_K3 = (
+    FLUX_ROW + k * EDGE_SPAN for k in range(8)
+)
+FORCE_BEFORE_I0, FORCE_BEFORE_I1, FORCE_BEFORE_J0, FORCE_BEFORE_J1 = (
+    HIGH_ROW + k * EDGE_SPAN for k in range(4)
+)
+INVERSE_I0, INVERSE_I1, INVERSE_J0, INVERSE_J1, INVERSE_K0, INVERSE_K1, INVERSE_K2, INVERSE_K3 = (
+    INVERSE + k * HEXAHEDRON_SPAN for k in range(8)
+)
 OTHER_GRID_OFFSET = OTHER_EDGE - EDGE
 # Edges along i, j, k of the eight corners of a cell, and offsets of the forces on them.
 CORNERS = (
-    (I0, J0, K0), (I0, J1, K2), (I1, J0, K1), (I1, J1, K3), (I0 + 1, J0 + 1, K0),
-    (I0 + 1, J1 + 1, K2), (I1 + 1, J0 + 1, K1), (I1 + 1, J1 + 1, K3),
+    (EDGE_I0, EDGE_J0, EDGE_K0), (EDGE_I0, EDGE_J1, EDGE_K2),
+    (EDGE_I1, EDGE_J0, EDGE_K1), (EDGE_I1, EDGE_J1, EDGE_K3),
+    (EDGE_I0 + 1, EDGE_J0 + 1, EDGE_K0), (EDGE_I0 + 1, EDGE_J1 + 1, EDGE_K2),
+    (EDGE_I1 + 1, EDGE_J0 + 1, EDGE_K1), (EDGE_I1 + 1, EDGE_J1 + 1, EDGE_K3),
 )  # fmt: skip
 FORCES = (
-    (FI0, FJ0, FK0), (FI0, FJ1, FK2), (FI1, FJ0, FK1), (FI1, FJ1, FK3), (HI0, HJ0, FK0),
-    (HI0, HJ1, FK2), (HI1, HJ0, FK1), (HI1, HJ1, FK3),
+    (FORCE_I0, FORCE_J0, FORCE_K0), (FORCE_I0, FORCE_J1, FORCE_K2),
+    (FORCE_I1, FORCE_J0, FORCE_K1), (FORCE_I1, FORCE_J1, FORCE_K3),
+    (FORCE_BEFORE_I0, FORCE_BEFORE_J0, FORCE_K0), (FORCE_BEFORE_I0, FORCE_BEFORE_J1, FORCE_K2),
+    (FORCE_BEFORE_I1, FORCE_BEFORE_J0, FORCE_K1), (FORCE_BEFORE_I1, FORCE_BEFORE_J1, FORCE_K3),
 )  # fmt: skip
 
 formula = kernel(allocates=False, forceinline=True)
@@ -338,9 +350,9 @@ def fill_centre_blocks(Z, n, area_weight, e2):
     its centre, so that a cell is as stiff as its corners.
     """
     for k in range(n):
-        a = take_mean_vector(Z, I0 + k, I0 + k + 1, I1 + k, I1 + k + 1)
-        b = take_mean_vector(Z, J0 + k, J0 + k + 1, J1 + k, J1 + k + 1)
-        c = take_mean_vector(Z, K0 + k, K1 + k, K2 + k, K3 + k)
+        a = take_mean_vector(Z, EDGE_I0 + k, EDGE_I0 + k + 1, EDGE_I1 + k, EDGE_I1 + k + 1)
+        b = take_mean_vector(Z, EDGE_J0 + k, EDGE_J0 + k + 1, EDGE_J1 + k, EDGE_J1 + k + 1)
+        c = take_mean_vector(Z, EDGE_K0 + k, EDGE_K1 + k, EDGE_K2 + k, EDGE_K3 + k)
         p = cross(b, c)
         q = cross(c, a)
         r = cross(a, b)
@@ -357,9 +369,13 @@ def fill_centre_blocks(Z, n, area_weight, e2):
         half_slope = 0.5 * (bracket + area_weight) * slope_over_chi
         weight = (Z[SUM + k] + 48.0 * Z[WEIGHT + k]) * 0.5
         weight = weight / (bracket + area_weight * (chi * chi + 1.0 - 2.0 * chi))
-        inverse_i = take_mean(Z, VI0 + k, VI0 + k + 1, VI1 + k, VI1 + k + 1)
-        inverse_j = take_mean(Z, VJ0 + k, VJ0 + k + 1, VJ1 + k, VJ1 + k + 1)
-        inverse_k = take_mean(Z, VK0 + k, VK1 + k, VK2 + k, VK3 + k)
+        inverse_i = take_mean(
+            Z, INVERSE_I0 + k, INVERSE_I0 + k + 1, INVERSE_I1 + k, INVERSE_I1 + k + 1
+        )
+        inverse_j = take_mean(
+            Z, INVERSE_J0 + k, INVERSE_J0 + k + 1, INVERSE_J1 + k, INVERSE_J1 + k + 1
+        )
+        inverse_k = take_mean(Z, INVERSE_K0 + k, INVERSE_K1 + k, INVERSE_K2 + k, INVERSE_K3 + k)
         block_i = compute_edge_block(
             weight * inverse_i * inverse_i,
             (a, b, c),

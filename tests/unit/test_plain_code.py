@@ -115,6 +115,27 @@ def test_constants_say_their_whole_meaning(package):
     assert not {name: found for name, found in values.items() if len(found) > 1}
 
 
+# constants of one or two letters: the field's symbols for quantities and coefficients, which also
+# stand in the formulas of docstrings
+SYMBOLS = set("U V P C C2 E X Y NX NY A B R1 R2 C0 S".split())
+
+
+@pytest.mark.parametrize("package", ["regrid", "hydro"])
+def test_constants_of_two_letters_are_symbols(package):
+    short = set()
+    for path, tree in read_trees(package):
+        for node in tree.body:
+            targets = node.targets if isinstance(node, ast.Assign) else []
+            names = [
+                name.id
+                for target in targets
+                for name in ast.walk(target)
+                if isinstance(name, ast.Name)
+            ]
+            short |= {(path.name, name) for name in names if name.isupper() and len(name) <= 2}
+    assert {name for _, name in short} <= SYMBOLS, sorted(short)
+
+
 # names and options that a user writes out, one by one
 TAKES_MANY = {
     "regrid.barrier.regridder.BarrierRegridder.__init__",

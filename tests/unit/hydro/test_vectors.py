@@ -24,10 +24,11 @@ LIMIT, SOUND, ENERGY = (
 )
 SWITCH = SOUND, ENERGY, HLL_JUMP_THRESHOLDS["hllc"], False
 I_FACES = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
-J_FACES = scratch.RHO_UP - 1, scratch.RHO_DOWN, scratch.AREA_X_J
+J_FACES = scratch.RHO_UP + scratch.CELL_BELOW, scratch.RHO_DOWN, scratch.AREA_X_J
 UPWIND_I = *I_FACES, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE
 UPWIND_J = *J_FACES, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1
-HLL = J_FACES, scratch.HLL - 1, scratch.VOIDED_ENERGY - 1, scratch.FLUX_J_MASS, 0, True
+MARKS = scratch.HLL + scratch.CELL_BELOW, scratch.VOIDED_ENERGY + scratch.CELL_BELOW
+HLL = J_FACES, MARKS, scratch.FLUX_J_MASS, 0, True
 RADIAL = (
     scratch.PRESSURE_J,
     scratch.FLUX_J_Y,

@@ -394,8 +394,7 @@ class Linked(Segment):
     """
 
     linked = True
-    sticks: bool = False  # solids on both sides share what acts along the line
-    bonded: bool = False  # solids of two blocks stick together at it
+    sticks: bool = False  # solids on both sides share what acts along the line: seams and bonds
 
 
 class Interface(Linked):
@@ -414,7 +413,7 @@ class Interface(Linked):
         self.tension = self.check_tension(tension)
         if not isinstance(bonded, bool):
             raise BadInput(f"{self}: interface: bonded = {bonded!r}; it is true or false")
-        self.bonded = self.sticks = bonded
+        self.sticks = bonded
 
 
 class Sliding(Linked):

@@ -121,8 +121,9 @@ def _check_materials(leader: Linked, follower: Linked) -> None:
     shear."""
     leader_eos = leader.block.eos
     follower_eos = follower.block.eos
+    is_bonded = leader.sticks and not leader.passes_mass
     for segment in (leader, follower):
-        if leader.bonded and segment.block.strength is None:
+        if is_bonded and segment.block.strength is None:
             raise BadInput(
                 f"{leader.kind}: {leader} and {follower} are bonded, and the material of block "
                 f"{segment.block.name!r} has no strength; only solids bear shear"

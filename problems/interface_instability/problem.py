@@ -18,6 +18,7 @@ import numpy as np
 
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.boundary import put
+from shockgrid.hydro.eos.gases import IdealGas
 from shockgrid.hydro.eos.mixture import SEEN_FIELDS, Mixture, mix
 from shockgrid.hydro.links import Link, join
 from shockgrid.hydro.mixture.phases import make_fraction_fields
@@ -202,6 +203,10 @@ class InterfaceInstability(Results, Problem):
         width = CLEAR_THICKNESSES * deck.diffusion_thickness
         if not width:
             return
+        if not all(isinstance(eos, IdealGas) for eos in (self.eos_first, self.eos_second)):
+            raise deck.error(
+                "diffusion_thickness", "only ideal gases mix into a layer of graded density"
+            )
         if deck.start == "crossed":
             raise deck.error(
                 "start",

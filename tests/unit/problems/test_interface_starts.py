@@ -261,8 +261,13 @@ def test_a_diffuse_layer_grades_the_density_of_both_materials():
 
 @pytest.mark.parametrize(
     "deck",
-    [{"start": "crossed"}, {"gap": 0.15}, {"lengths": (0.9, 0.2)}],
+    [
+        {"start": "crossed"},
+        {"gap": 0.15},
+        {"lengths": (0.9, 0.2)},
+        {"second": Fluid(material="water"), "pressure": 1e5, "first": Fluid(material="air")},
+    ],
 )
-def test_a_diffuse_layer_needs_room_and_the_incident_shock(deck):
+def test_a_diffuse_layer_needs_gases_room_and_the_incident_shock(deck):
     with pytest.raises(BadInput, match="layer of graded density"):
         make_layer(**deck)

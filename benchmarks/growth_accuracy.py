@@ -41,7 +41,7 @@ def measure_row(materials: str, **deck) -> Measured | None:
     """
     problem = InterfaceInstability(InterfaceDeck(**deck))
     (mode,) = problem.harmonics
-    growth = Growth(problem)
+    growth = Growth(problem.shocked)
     window = growth.find_window(mode, problem.deck.kct_end)
     if window is None or not window.linear:
         print(f"left out, too steep for linear theory: {deck}", flush=True)

@@ -157,7 +157,7 @@ def measure_growth(problem, history, first=6.0, last=30.0) -> float:
     known = np.isfinite(history["amplitude"]) & np.isfinite(history["t"])
     mode = problem.harmonics[0]
     columns = {name: np.asarray(history[name])[known] for name in ("t", mode.column)}
-    return Growth(problem).measure_rate(columns, mode, first, last)
+    return Growth(problem.shocked).measure_rate(columns, mode, first, last)
 
 
 def find_unexplained(history, name) -> float:

@@ -4,7 +4,7 @@ A captured shock that runs over a bent line leaves waves of a few cells on it an
 density beside it.  Here the run begins a time T after the shock met the mean line, T being such
 that the nearer of the two waves that it leaves is `layer` cells away.  Everything is known then:
 
-- Each row of cells sees the plane Riemann problem, at its own time and place (theory F15.1).
+- Each row of cells sees the plane Riemann shocked, at its own time and place (theory F15.1).
 - Linear compressible theory gives what has grown since then, harmonic by harmonic of the line
   (theory F15.2 to F15.4).
 - A shock stands on a grid line, with the discrete profile that it has on cells that move as those
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shockgrid.problems.initial_states import Front, settle_front
+from shockgrid.problems.interface_instability.shocked import Shocked
 from shockgrid.problems.interface_instability.spacing import grow_steps
 from shockgrid.problems.references.linear_growth import PerturbedFlow, PerturbedLayer
 from shockgrid.problems.references.riemann import compute_cell_averages
@@ -69,21 +70,28 @@ def find_nearer_speed(base) -> float:
 
 
 class CrossedStart:
-    """The state of an `InterfaceInstability` `since` [s] after the shock met the mean line."""
+    """The state after the shock met the mean line, at the start of the run.
 
-    def __init__(self, problem, since: float):
-        self.problem = problem
-        self.since = since
-        self.base = problem.linear_growth.base
-        self.shock = problem.shock
-        self.y = problem.make_heights()
-        self.first_line = problem.shape(self.y)
-        self.waves = find_waves(self.y, self.first_line, problem.deck.sides == "wall")
+    line: first places x (n,) [m] of the interface's nodes; ends: first places [m] of the far sides,
+    which are_open or are not.
+    """
+
+    def __init__(
+        self, shocked: Shocked, line: np.ndarray, ends: tuple[float, float], are_open: bool
+    ):
+        self.shocked = shocked
+        self.since = -shocked.arrival
+        self.base = shocked.linear_growth.base
+        self.shock = shocked.shock
+        self.y = shocked.heights
+        self.ends = ends
+        self.are_open = are_open
+        self.waves = find_waves(self.y, line, shocked.deck.sides == "wall")
 
     @functools.cached_property
     def fields(self) -> list:
         """Linear theory's perturbed flow of each harmonic at T."""
-        theory = self.problem.linear_growth
+        theory = self.shocked.linear_growth
         return [theory.compute_fields(wave.wavenumber * self.since) for wave in self.waves]
 
     def sum_waves(self, y: np.ndarray, parts, sine: bool = False) -> np.ndarray:
@@ -119,23 +127,23 @@ class Side:
     def __init__(self, start: CrossedStart, sign: float):
         self.start = start
         self.sign = sign
-        problem = start.problem
+        shocked = start.shocked
         base = start.base
-        shock = problem.shock
-        deck = problem.deck
+        shock = shocked.shock
+        deck = shocked.deck
         if sign < 0.0:
-            self.eos = problem.eos_first
+            self.eos = shocked.eos_first
             self.wave = base.left_wave
             rho = base.rho_left
             self.ahead = shock.rho, sign * shock.particle_speed, shock.p
         else:
-            self.eos = problem.eos_second
+            self.eos = shocked.eos_second
             self.wave = base.right_wave
             rho = base.rho_right
-            self.ahead = problem.rho_second, 0.0, deck.pressure
+            self.ahead = shocked.rho_second, 0.0, deck.pressure
         self.behind = rho, sign * base.u, base.p
-        self.end_speed = (self.behind if problem.has_open_ends else self.ahead)[1]
-        self.length = abs(problem.find_ends()[int(sign > 0.0)] - base.u * start.since)
+        self.end_speed = (self.behind if start.are_open else self.ahead)[1]
+        self.length = abs(start.ends[int(sign > 0.0)] - base.u * start.since)
         self.speeds = [abs(self.wave.tail - base.u)]  # of fronts, from the interface
         size = deck.wavelength / deck.cells
         if abs(self.wave.head - self.wave.tail) * start.since > THIN_RAREFACTION_CELLS * size:
@@ -158,7 +166,7 @@ class Side:
         if len(self.speeds) > 1:
             sizes = size
         remaining_length = self.length - edges[-1]
-        even = self.start.problem.deck.uniform * self.start.problem.deck.wavelength
+        even = self.start.shocked.deck.uniform * self.start.shocked.deck.wavelength
         positions.append(
             edges[-1] + self._grade(remaining_length, sizes, max(0.0, even - edges[-1]))
         )
@@ -166,7 +174,7 @@ class Side:
 
     def _grade(self, length: float, size: float, even: float) -> np.ndarray:
         """Distances (n,) up to `length` of nodes that begin with `size`, grown beyond `even`."""
-        stretch = self.start.problem.deck.stretch
+        stretch = self.start.shocked.deck.stretch
         steps = [size] * max(1, round(min(even, length) / size))
         steps = grow_steps(steps, stretch, length)
         # the first cells keep their size, those beyond take up what is too much, in proportion
@@ -210,7 +218,7 @@ class Side:
         until then is part of it (theory F15.6).  Lines beyond the reach are straight.
         """
         start = self.start
-        theory = self.start.problem.linear_growth
+        theory = self.start.shocked.linear_growth
         front = self.away[self.places[-1]]
         amplitudes = [flow.amplitude]
         for speed in self.speeds:
@@ -247,7 +255,7 @@ class Side:
         row[:, : self.places[0]] = np.array(self.behind)[:, None]
         if self.is_shock:
             if abs(self.behind[2] - self.ahead[2]) > LEAST_JUMP * abs(self.ahead[2]):
-                deck = self.start.problem.deck
+                deck = self.start.shocked.deck
                 cfl = deck.run.cfl * self.front.measure_signal() / signal
                 first, settled = settle_front(self.front, cfl=cfl, limiter=deck.limiter)
                 row[:, first : first + settled.shape[1]] = settled[:, : count - first]

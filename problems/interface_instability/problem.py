@@ -47,12 +47,13 @@ from shockgrid.problems.interface_instability.line import (
     read_line,
 )
 from shockgrid.problems.interface_instability.report import Results
+from shockgrid.problems.interface_instability.shocked import Echo, Shocked
 from shockgrid.problems.interface_instability.spacing import (
     FINE_ZONE_WAVELENGTHS,
     NODE_SPEED,
     Spacing,
 )
-from shockgrid.problems.interface_instability.theories import Growth, find_cautions
+from shockgrid.problems.interface_instability.theories import find_cautions, sum_slopes
 from shockgrid.problems.interface_instability.zone import (
     ZONE_BLOCK,
     ZONE_UNITS,
@@ -321,7 +322,9 @@ class InterfaceInstability(Results, Problem):
         begins_in_time = (
             self.deck.run.t_end is not None or self._choose_since() * self._rate < self.deck.kct_end
         )
-        can_cross = not fault and begins_in_time and Growth(self).first_slope <= MOST_SLOPE
+        can_cross = (
+            not fault and begins_in_time and sum_slopes(self.harmonics, self.k) <= MOST_SLOPE
+        )
         return "crossed" if can_cross else "incident"
 
     def _choose_since(self) -> float:
@@ -342,9 +345,33 @@ class InterfaceInstability(Results, Problem):
         return max(0.0, back), base.right_wave.head * since
 
     @functools.cached_property
+    def shocked(self) -> Shocked:
+        """What is known of the shock and the interface before the run."""
+        single = self.deck.second_shock is None
+        return Shocked(
+            self.deck,
+            self.eos_first,
+            self.eos_second,
+            self.rho_first,
+            self.rho_second,
+            self.shock,
+            self.linear_growth,
+            self.k,
+            self.amplitude,
+            self.harmonics,
+            self.make_heights(),
+            self.file_line,
+            self.arrival,
+            self.t_end,
+            self.find_echoes() if single else {},
+            self.may_hand_over,
+        )
+
+    @functools.cached_property
     def crossed(self) -> CrossedStart:
         """The state after the passage."""
-        return CrossedStart(self, -self.arrival)
+        line = self.shape(self.make_heights())
+        return CrossedStart(self.shocked, line, self.find_ends(), self.has_open_ends)
 
     def _make_shock(self) -> Shock:
         deck = self.deck
@@ -489,11 +516,8 @@ class InterfaceInstability(Results, Problem):
         echo = shock_with_particle_speed(self.eos_second, base.rho_right, base.p, base.u)
         return base.right_wave.head, echo.shock_speed
 
-    def find_echoes(self) -> dict[str, float]:
-        """Earliest times [s] at which waves are back from the far ends, by the block's name.
-
-        Not for two shocks, of which the second sends waves of its own.
-        """
+    def find_echoes(self) -> dict[str, Echo]:
+        """Waves that are back from the far ends, by the block's name."""
         first, second = self.choose_lengths()
         base = self.linear_growth.base
         if self.has_open_ends:
@@ -501,16 +525,15 @@ class InterfaceInstability(Results, Problem):
                 ("first", first, base.u - base.left_wave.head, self.c_first),
                 ("second", second, base.right_wave.head - base.u, self.linear_growth.sound_speed),
             )
-            return {name: self.arrival + way / out + way / c for name, way, out, c in waves}
+            return {
+                name: Echo(self.arrival + way / out + way / c, c) for name, way, out, c in waves
+            }
         front, back = self._find_second_echo()
         late = second * (front - self.linear_growth.base.u + back) / (front * back)
-        return {"first": self._find_first_echo(first), "second": self.arrival + late}
-
-    def find_echo_speeds(self) -> dict[str, float]:
-        """How fast these waves run towards the interface [m/s], by the block's name."""
-        if self.has_open_ends:
-            return {"first": self.c_first, "second": self.linear_growth.sound_speed}
-        return {"first": self._find_chase(), "second": self._find_second_echo()[1]}
+        return {
+            "first": Echo(self._find_first_echo(first), self._find_chase()),
+            "second": Echo(self.arrival + late, back),
+        }
 
     @functools.cached_property
     def spacing(self) -> Spacing:
@@ -760,7 +783,7 @@ class InterfaceInstability(Results, Problem):
         }
 
     def cautions(self, run) -> list[str]:
-        return find_cautions(self, run)
+        return find_cautions(self.shocked, run)
 
 
 def measure_far_speed(block: Block) -> float:

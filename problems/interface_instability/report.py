@@ -14,6 +14,7 @@ from shockgrid.problems.interface_instability.reshock import (
     find_reshock,
     scale_since,
 )
+from shockgrid.problems.interface_instability.shocked import Shocked
 from shockgrid.problems.interface_instability.theories import (
     LEAST_WINDOW,
     MOST_COUPLED_KA,
@@ -47,22 +48,24 @@ SAID_THEORY_ERROR = 2e-4  # error of the theory's numbers from which on it is sa
 NO_WAVE = 1e-6  # of the shock's pressure: a weaker reflected wave is none
 
 
-def _columns(problem, history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _columns(
+    followed: Sequence[Harmonic], history: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """The columns used here, without rows that have no amplitude."""
     names = ["t", "amplitude", "interface_mean", "interface_min", "interface_max",
-             "far_transverse_speed", *(mode.column for mode in problem.followed)]  # fmt: skip
+             "far_transverse_speed", *(mode.column for mode in followed)]  # fmt: skip
     column = {name: np.asarray(history[name], dtype=float) for name in names if name in history}
     known = np.isfinite(column["amplitude"]) & np.isfinite(column["t"])
     return {name: values[known] for name, values in column.items()}
 
 
-def _describe_handover(problem, history: Mapping[str, np.ndarray]) -> list[str]:
+def _describe_handover(shocked: Shocked, history: Mapping[str, np.ndarray]) -> list[str]:
     """From when on both materials are on one grid, and what was measured before and after."""
     mixed = np.flatnonzero(np.asarray(history.get("mixed_mass", ())) > 0.0)
     if not mixed.size or mixed[0] == 0:
         return []
     row = int(mixed[0])
-    kct = float(get_kct(problem, history["t"][row]))
+    kct = float(get_kct(shocked, history["t"][row]))
     measured = []
     for name in ("amplitude", "integral_width", "circulation"):
         before, after = (float(history[name][at]) for at in (row - 1, row))
@@ -71,29 +74,29 @@ def _describe_handover(problem, history: Mapping[str, np.ndarray]) -> list[str]:
     return [f"both materials on one grid from k c t = {kct:.3g} on: {', '.join(measured)}"]
 
 
-def _describe_ends(problem) -> list[str]:
+def _describe_ends(shocked: Shocked) -> list[str]:
     """When waves are back from the ends of a tube that a run is to go on in."""
-    if problem.deck.lengths is None or not problem.may_hand_over:
+    if not shocked.is_tube:
         return []
     ends = {"first": "the piston's end", "second": "the end wall"}
     returned = [
-        f"from {ends[name]} at k c t = {float(get_kct(problem, t)):.3g}"
-        for name, t in problem.find_echoes().items()
-        if t < problem.t_end
+        f"from {ends[name]} at k c t = {float(get_kct(shocked, t)):.3g}"
+        for name, (t, _) in shocked.echoes.items()
+        if t < shocked.t_end
     ]
     return [f"waves come back {' and '.join(returned)}; no theory goes on"] if returned else []
 
 
-def _predict(problem) -> list[Row]:
+def _predict(shocked: Shocked) -> list[Row]:
     """Theory alone; growth_rate is the mean over the part of WINDOW that the run reaches."""
-    theory = problem.linear_growth
-    if problem.deck.second_shock is not None:
+    theory = shocked.linear_growth
+    if shocked.deck.second_shock is not None:
         return []
     known = {"interface_speed": theory.base.u, "atwood_number": theory.atwood}
     rows = [Row(name, theory=value) for name, value in known.items()]
-    if problem.harmonics:
-        reach = min(problem.t_end, Growth(problem).open_time)
-        last = min(WINDOW[1], float(get_kct(problem, reach)))
+    if shocked.harmonics:
+        reach = min(shocked.t_end, Growth(shocked).open_time)
+        last = min(WINDOW[1], float(get_kct(shocked, reach)))
         if last > WINDOW[0] + LEAST_WINDOW:
             rows.append(Row("growth_rate", theory=theory.get_mean_rate(WINDOW[0], last)))
         rows.append(Row("impulsive_rate", theory=theory.impulsive))
@@ -106,33 +109,33 @@ def find_strongest(modes: Sequence[Harmonic]) -> list[Harmonic]:
     return sorted(steepest, key=lambda mode: mode.number)
 
 
-def _describe_modes(problem) -> str:
-    modes = problem.harmonics
+def _describe_modes(shocked: Shocked) -> str:
+    modes = shocked.harmonics
     if not modes:
         return "no wave"
     if len(modes) > MOST_CURVES:
-        rms = problem.k * math.sqrt(sum(0.5 * mode.amplitude**2 for mode in modes))
+        rms = shocked.k * math.sqrt(sum(0.5 * mode.amplitude**2 for mode in modes))
         return f"{len(modes)} modes, {modes[0].number} to {modes[-1].number}, k a rms = {rms:.4g}"
-    sizes = ", ".join(f"{problem.k * abs(mode.amplitude):g}" for mode in modes)
+    sizes = ", ".join(f"{shocked.k * abs(mode.amplitude):g}" for mode in modes)
     numbers = ", ".join(str(mode.number) for mode in modes)
     return f"k a0 = {sizes}" + (f" of modes {numbers}" if numbers != "1" else "")
 
 
-def _compare(problem, column, kct: float) -> tuple[list[Row], list[str]]:
+def _compare(shocked: Shocked, column, kct: float) -> tuple[list[Row], list[str]]:
     """Rows of the modes, the speed and the models, and what else is to be said of the growth."""
-    theory = problem.linear_growth
-    growth = Growth(problem)
+    theory = shocked.linear_growth
+    growth = Growth(shocked)
     notes = []
     t = column["t"]
     exact = float(theory.base.u)
     until = min(t[-1], growth.open_time)
-    after = (t > problem.arrival + 0.3 * (until - problem.arrival)) & (t <= until)
+    after = (t > shocked.arrival + 0.3 * (until - shocked.arrival)) & (t <= until)
     speed = fit_slope(t, column["interface_mean"], after)
     label = "interface speed [m/s]" if math.isfinite(speed) else ""
     source = "exact Riemann solution"
     last = Row("interface_speed", speed, exact, label, digits=5, studied=True, source=source)
-    modes = problem.harmonics
-    several = len(problem.harmonics) > 1
+    modes = shocked.harmonics
+    several = len(shocked.harmonics) > 1
     if not modes:
         return [last], ["growth: the interface is flat"]
     shown = several or growth.linear_reach > 0.0 or bool(growth.model_fails)
@@ -202,7 +205,7 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
         return [Row(name, rate, expected, label, digits=5, studied=True, source=source)]
     share = f"{100.0 * (rate - expected) / theory.base.u:+.2f} % of u"
     source += "; u: interface speed"
-    times = mode.number * get_kct(growth.problem, column["t"])
+    times = mode.number * get_kct(growth.shocked, column["t"])
     size = float(np.interp(window.last, times, column[mode.column])) / mode.amplitude
     size_expected = float(predict_amplitude(theory, window.last))
     size_expected = theory.compression + (size_expected - theory.compression) / reduction
@@ -216,9 +219,9 @@ def _compare_mode(growth, mode: Harmonic, column, kct: float, several: bool, sho
 
 def _compare_model(growth, column, kct: float) -> Row:
     """The row of the Padé model, at the end or where its range ends."""
-    problem = growth.problem
+    shocked = growth.shocked
     last = min(kct, growth.model_reach)
-    t = problem.arrival + last / (problem.k * problem.linear_growth.sound_speed)
+    t = shocked.arrival + last / (shocked.k * shocked.linear_growth.sound_speed)
     computed = float(np.interp(t, column["t"], column["amplitude"]))
     model = float(growth.compute_model(np.array([t]))[-1])
     ends = last < kct
@@ -237,9 +240,9 @@ class _Curve(NamedTuple):
     number: int
 
 
-def _choose_curves(problem, growth, column) -> list[_Curve]:
+def _choose_curves(shocked: Shocked, growth, column) -> list[_Curve]:
     """The whole line where it is steep, else each of its modes."""
-    modes = [mode for mode in problem.harmonics if mode.column in column]
+    modes = [mode for mode in shocked.harmonics if mode.column in column]
     one = len(modes) == 1 and growth is not None
     if not modes or growth is None or (one and growth.linear_reach == 0.0):
         return [_Curve("computed", column["amplitude"], column["amplitude"][0] or 1.0, 1)]
@@ -251,10 +254,10 @@ def _choose_curves(problem, growth, column) -> list[_Curve]:
 
 def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.ndarray) -> None:
     """Theories of the curves, and the time up to which they hold, where it ends."""
-    problem = growth.problem
+    shocked = growth.shocked
     theory = growth.theory
     known = (kct > 0.0) & (kct <= min(theory.kt[-1] * theory.sound_speed, growth.open_reach))
-    t = column["t"][known] - problem.arrival
+    t = column["t"][known] - shocked.arrival
     reach = growth.linear_reach
     several = len(curves) > 1
     for n, curve in enumerate(curves):
@@ -263,9 +266,9 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
         pressed = theory.compression
         grown = predict_amplitude(theory, curve.number * kct[known]) - pressed
         amplitude.plot(kct[known], pressed + grown / reduction, **dashes)
-        rate.plot(kct[known], theory.get_rate(curve.number * problem.k, t) / reduction, **dashes)
+        rate.plot(kct[known], theory.get_rate(curve.number * shocked.k, t) / reduction, **dashes)
     label = "linear compressible"
-    modes = len(problem.harmonics) > 1
+    modes = len(shocked.harmonics) > 1
     label += ", waves couple" if modes and reach == 0.0 else ""
     for axes in (amplitude, rate)[modes:]:  # the first is too narrow for this and names of modes
         axes.plot([], [], "k--", label=label)
@@ -284,13 +287,13 @@ def _draw_theory(amplitude, rate, growth, curves: list[_Curve], column, kct: np.
         amplitude.set_ylim(0.0, 1.6 * top)
 
 
-def _draw_rates(problem, axes, t, curves: list[_Curve]) -> None:
+def _draw_rates(shocked: Shocked, axes, t, curves: list[_Curve]) -> None:
     """Computed rates after the shock's passage."""
     for n, c in enumerate(curves):
         times, speed = compute_rates(t, c.values)
-        kct = get_kct(problem, times)
+        kct = get_kct(shocked, times)
         shown = kct > FIRST_DRAWN_KCT
-        rate = speed / (c.number * problem.k * c.first)
+        rate = speed / (c.number * shocked.k * c.first)
         label = f"{c.label} (after shock passage)" if len(curves) <= MOST_NAMED else None
         axes.plot(kct[shown], rate[shown], color=f"C{n}", label=label)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
@@ -305,11 +308,13 @@ def find_reach(drawn: Sequence[Sequence[np.ndarray]], margin: float) -> float:
     return max((max(0.6 * np.ptp(x) + margin, 0.5 * np.ptp(y)) for x, y in lines), default=0.0)
 
 
-def _mark_handover(axes, problem, history: Mapping[str, np.ndarray], kct: np.ndarray) -> None:
+def _mark_handover(
+    axes, shocked: Shocked, history: Mapping[str, np.ndarray], kct: np.ndarray
+) -> None:
     """A line where both materials come onto one grid."""
     mixed = np.flatnonzero(np.asarray(history.get("mixed_mass", ())) > 0.0)
     if mixed.size and mixed[0] > 0:
-        at = float(get_kct(problem, history["t"][mixed[0]]))
+        at = float(get_kct(shocked, history["t"][mixed[0]]))
         axes.axvline(at, color="C3", lw=0.8, label="one grid for both")
 
 
@@ -325,9 +330,9 @@ class Results:
         theory = self.linear_growth
         deck = self.deck
         if not run.begun:
-            return Report(rows=_predict(self))
-        column = _columns(self, run.history)
-        first, kct = (float(get_kct(self, t)) for t in (0.0, column["t"][-1]))
+            return Report(rows=_predict(self.shocked))
+        column = _columns(self.followed, run.history)
+        first, kct = (float(get_kct(self.shocked, t)) for t in (0.0, column["t"][-1]))
         times = f"to k c t = {kct:.3g}"
         if self.start == "crossed":
             times = f"from linear theory at k c t = {first:.2g} to {kct:.3g}"
@@ -337,7 +342,7 @@ class Results:
         head = [
             f"Mach {self.shock.shock_speed / ahead:.3g} shock (to p = {self.shock.p:.4g} Pa) from "
             f"density {self.rho_first:g} kg/m3 into density {self.rho_second:g} kg/m3; "
-            f"{_describe_modes(self)}, {deck.cells} cells per wavelength, {times}",
+            f"{_describe_modes(self.shocked)}, {deck.cells} cells per wavelength, {times}",
             f"  reflected wave: {reflected}, Atwood number after the shock {theory.atwood:.3f}",
             f"  smoothing length of the interface: {self.thickness / deck.wavelength:.3g} "
             f"wavelengths ({self.thickness * deck.cells / deck.wavelength:.2g} of a cell)",
@@ -345,12 +350,12 @@ class Results:
         rows = []
         notes = ["growth: there is no theory for two shocks"]
         if deck.second_shock is None:
-            rows, notes = _compare(self, column, kct)
-        notes += _describe_ends(self)
-        if reshock := find_reshock(self):
-            rows += compare_growth(self, reshock, column)
+            rows, notes = _compare(self.shocked, column, kct)
+        notes += _describe_ends(self.shocked)
+        if reshock := find_reshock(self.shocked):
+            rows += compare_growth(self.shocked, reshock, column)
             notes.append(describe_reshock(reshock))
-        notes += _describe_handover(self, run.history)
+        notes += _describe_handover(self.shocked, run.history)
         far = column["far_transverse_speed"].max() / theory.sound_speed
         notes.append(
             f"amplitude {column['amplitude'][0]:.4g} -> {column['amplitude'][-1]:.4g} m, largest "
@@ -359,7 +364,7 @@ class Results:
         return Report("\n".join(head), rows, notes)
 
     def scale_time(self, t):
-        return f"k c t = {float(get_kct(self, t)):.3g}"
+        return f"k c t = {float(get_kct(self.shocked, t)):.3g}"
 
     def figures(self):
         found = super().figures()
@@ -368,7 +373,7 @@ class Results:
 
     def _is_reshocked(self) -> bool:
         """Whether the run is to show what the shock does that comes back from an end wall."""
-        return find_reshock(self) is not None
+        return find_reshock(self.shocked) is not None
 
     def draw_growth(self, figure, run) -> None:
         """Amplitude and growth rate against theory, and the interface with its grid at the end."""
@@ -384,22 +389,22 @@ class Results:
         narrow = SHOWN_TIMES if flat else 2
         amplitude = figure.add_subplot(grid[0, :narrow])
         rate = figure.add_subplot(grid[0, narrow:])
-        column = _columns(self, run.history)
-        kct = get_kct(self, column["t"])
+        column = _columns(self.followed, run.history)
+        kct = get_kct(self.shocked, column["t"])
         several = len(self.harmonics) > 1
-        growth = Growth(self) if self.deck.second_shock is None and self.harmonics else None
-        curves = _choose_curves(self, growth, column)
+        growth = Growth(self.shocked) if self.deck.second_shock is None and self.harmonics else None
+        curves = _choose_curves(self.shocked, growth, column)
         for n, curve in enumerate(curves):
             amplitude.plot(kct, curve.values / curve.first, color=f"C{n}", label=curve.label)
         if growth is not None:
             _draw_theory(amplitude, rate, growth, curves, column, kct)
         if len(kct) > 3:
-            _draw_rates(self, rate, column["t"], curves)
+            _draw_rates(self.shocked, rate, column["t"], curves)
         time_label = "k c t after the shock's arrival" + ", k of mode 1" * several
         amplitude.set(xlabel=time_label, ylabel="a / a0")
         rate.set(xlabel=time_label, ylabel="(da/dt) / (k a0)")
         for axes in (amplitude, rate):
-            _mark_handover(axes, self, run.history, kct)
+            _mark_handover(axes, self.shocked, run.history, kct)
         if drawn:
             places = [(1 + n, slice(None)) for n in range(len(drawn))]
             if not flat:
@@ -434,7 +439,7 @@ class Results:
 
     def draw_reshock(self, figure, run) -> None:
         """Widths of the zone after the reshock beside the growth of a turbulent zone."""
-        reshock = find_reshock(self)
+        reshock = find_reshock(self.shocked)
         history = run.history
         wavelength = self.deck.wavelength
         since = scale_since(reshock, wavelength, history["t"])
@@ -469,7 +474,7 @@ class Results:
         modes = self.harmonics
         known = np.flatnonzero(np.isfinite(history["amplitude"]))
         numbers, first = np.array([(mode.number, mode.amplitude) for mode in modes]).T
-        kct = np.asarray(get_kct(self, history["t"]), dtype=float)
+        kct = np.asarray(get_kct(self.shocked, history["t"]), dtype=float)
         axes, lines = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
         axes.semilogy(numbers, np.abs(first) * self.k, "o-", color="0.6", ms=3, label="start")
         for n in range(SHOWN_TIMES):

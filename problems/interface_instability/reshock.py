@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shockgrid.problems.interface_instability.shocked import Shocked
 from shockgrid.problems.references.hugoniot import shock_with_particle_speed
 from shockgrid.problems.references.riemann import solve_riemann
 from shockgrid.problems.report import Row
@@ -39,19 +40,18 @@ class Reshock(NamedTuple):
         return self.atwood * self.jump
 
 
-def find_reshock(problem) -> Reshock | None:
-    """What an `InterfaceInstability` meets again; None where the end of its tube is not meant."""
-    deck = problem.deck
-    if deck.lengths is None or not problem.may_hand_over or deck.second_shock is not None:
+def find_reshock(shocked: Shocked) -> Reshock | None:
+    """What the interface meets again; None where the end of its tube is not meant."""
+    if not shocked.is_tube or shocked.deck.second_shock is not None:
         return None
-    base = problem.linear_growth.base
-    arrival = problem.find_echoes()["second"]
-    if base.gap or arrival >= problem.t_end:
+    base = shocked.linear_growth.base
+    arrival = shocked.echoes["second"].t
+    if base.gap or arrival >= shocked.t_end:
         return None
     # the wall brings the second material to rest; that shock meets the interface
-    echo = shock_with_particle_speed(problem.eos_second, base.rho_right, base.p, base.u)
+    echo = shock_with_particle_speed(shocked.eos_second, base.rho_right, base.p, base.u)
     first = base.rho_left, base.u, base.p
-    after = solve_riemann(problem.eos_first, first, problem.eos_second, (echo.rho, 0.0, echo.p))
+    after = solve_riemann(shocked.eos_first, first, shocked.eos_second, (echo.rho, 0.0, echo.p))
     contrast = abs(after.rho_right - after.rho_left) / (after.rho_right + after.rho_left)
     return Reshock(arrival, base.u - after.u, contrast)
 
@@ -61,9 +61,11 @@ def scale_since(reshock: Reshock, wavelength: float, t: np.ndarray) -> np.ndarra
     return (np.asarray(t) - reshock.arrival) * reshock.speed / wavelength
 
 
-def compare_growth(problem, reshock: Reshock, column: Mapping[str, np.ndarray]) -> list[Row]:
+def compare_growth(
+    shocked: Shocked, reshock: Reshock, column: Mapping[str, np.ndarray]
+) -> list[Row]:
     """Rows of the growth of the width between both tips, over A times the jump."""
-    since = scale_since(reshock, problem.deck.wavelength, column["t"])
+    since = scale_since(reshock, shocked.deck.wavelength, column["t"])
     width = column["interface_max"] - column["interface_min"]
     rows = []
     for number, (first, last) in enumerate(WINDOWS, 1):

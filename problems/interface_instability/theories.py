@@ -31,6 +31,7 @@ from shockgrid.hydro.eos import IdealGas
 from shockgrid.hydro.eos.base import is_same_material
 from shockgrid.hydro.formulas.reconstruction import LOW_MACH
 from shockgrid.problems.interface_instability.line import Harmonic
+from shockgrid.problems.interface_instability.shocked import Shocked
 from shockgrid.problems.references.diffuse_layers import compute_growth_reduction
 from shockgrid.problems.references.hugoniot import caution_fit
 from shockgrid.problems.references.linear_growth import LinearGrowth, PadeModel
@@ -59,9 +60,10 @@ class Window:
     linear: bool
 
 
-def get_kct(problem, t):
-    """k c t since the shock met the mean interface, k being 2 pi / wavelength."""
-    return (np.asarray(t) - problem.arrival) * problem.k * problem.linear_growth.sound_speed
+def get_kct(shocked, t):
+    """k c t since the shock met the mean interface, k being 2 pi / wavelength; shocked: what is
+    known of it, or its problem."""
+    return (np.asarray(t) - shocked.arrival) * shocked.k * shocked.linear_growth.sound_speed
 
 
 def predict_amplitude(theory: LinearGrowth, kct):
@@ -83,38 +85,37 @@ def is_still(theory: LinearGrowth, rate: float) -> bool:
     return abs(rate) < STILL_RATE_PART * abs(theory.base.u)
 
 
+def sum_slopes(harmonics: Sequence[Harmonic], wavenumber: float) -> float:
+    """Sum of the k a of all modes of the first line, each with its own k."""
+    return sum(abs(mode.number * wavenumber * mode.amplitude) for mode in harmonics)
+
+
 class Growth:
-    """Theories for one `InterfaceInstability`: which apply, how far."""
+    """Theories for one shocked interface: which apply, how far."""
 
-    def __init__(self, problem):
-        self.problem = problem
-        self.theory = problem.linear_growth
-
-    @property
-    def first_slope(self) -> float:
-        """Sum of the k a of all modes of the first line, each with its own k."""
-        modes = self.problem.harmonics
-        wavenumber = self.problem.k
-        return sum(abs(mode.number * wavenumber * mode.amplitude) for mode in modes)
+    def __init__(self, shocked: Shocked):
+        self.shocked = shocked
+        self.theory = shocked.linear_growth
+        self.first_slope = sum_slopes(shocked.harmonics, shocked.k)
 
     def find_reduction(self, number: int) -> float:
         """psi by which a mode grows more slowly on a layer of graded density; 1 without one.
 
         The layer is pressed together as the materials on both sides are, by their mean.
         """
-        problem = self.problem
-        thickness = problem.deck.diffusion_thickness
+        shocked = self.shocked
+        thickness = shocked.deck.diffusion_thickness
         if not thickness:
             return 1.0
         base = self.theory.base
-        pressed = 0.5 * (problem.rho_first / base.rho_left + problem.rho_second / base.rho_right)
-        slope = number * problem.k * thickness * pressed
+        pressed = 0.5 * (shocked.rho_first / base.rho_left + shocked.rho_second / base.rho_right)
+        slope = number * shocked.k * thickness * pressed
         return compute_growth_reduction(self.theory.atwood, slope)
 
     @property
     def limit(self) -> float:
         """Largest sum of the modes' k a to which linear theory applies."""
-        if len(self.problem.harmonics) > 1:
+        if len(self.shocked.harmonics) > 1:
             return MOST_COUPLED_KA
         return min(
             MOST_LINEAR_KA, math.sqrt(8.0 * MOST_RATE_LOSS / (4.0 * self.theory.atwood**2 + 1.0))
@@ -126,33 +127,32 @@ class Growth:
 
         A computed shock is some cells wide, and the crest that is ahead meets it first.
         """
-        problem = self.problem
-        wavelength = problem.deck.wavelength
+        shocked = self.shocked
+        wavelength = shocked.deck.wavelength
         found = []
-        for name, t in problem.find_echoes().items():
-            kct = max(0.0, float(get_kct(problem, t)))
+        for t, speed in shocked.echoes.values():
+            kct = max(0.0, float(get_kct(shocked, t)))
             growth = 1.0 + kct * abs(self.theory.impulsive) / self.theory.sound_speed
-            front = SHOCK_CELLS / problem.deck.cells * wavelength + problem.amplitude * growth
-            speed = problem.find_echo_speeds()[name]
+            front = SHOCK_CELLS / shocked.deck.cells * wavelength + shocked.amplitude * growth
             found.append(t - min(front, MOST_FRONT_WAVELENGTHS * wavelength) / speed)
         return min(found)
 
     @functools.cached_property
     def open_reach(self) -> float:
         """k c t (k of the wavelength) up to which no wave is back from the far sides."""
-        return float(get_kct(self.problem, self.open_time))
+        return float(get_kct(self.shocked, self.open_time))
 
     @functools.cached_property
     def linear_reach(self) -> float:
         """k c t (k of the wavelength) up to which linear theory applies; 0 where nowhere."""
-        modes = self.problem.harmonics
+        modes = self.shocked.harmonics
         theory = self.theory
         limit = self.limit
-        end = float(max(WINDOW[1], get_kct(self.problem, self.problem.t_end)))
+        end = float(max(WINDOW[1], get_kct(self.shocked, self.shocked.t_end)))
         kct = np.linspace(0.0, end, 1201)
         slopes = np.zeros_like(kct)
         for mode in modes:
-            slope = abs(mode.number * self.problem.k * mode.amplitude)
+            slope = abs(mode.number * self.shocked.k * mode.amplitude)
             slopes += slope * np.abs(predict_amplitude(theory, mode.number * kct))
         steep = np.flatnonzero(slopes > limit)
         if self.first_slope > limit:
@@ -162,7 +162,7 @@ class Growth:
     def find_window(self, mode: Harmonic, kct_end: float) -> Window | None:
         """The window of a mode for a run up to `kct_end` (k of the wavelength), or until waves
         return; None: too short."""
-        first = max(WINDOW[0], mode.number * float(get_kct(self.problem, 0.0)))
+        first = max(WINDOW[0], mode.number * float(get_kct(self.shocked, 0.0)))
         last = min(WINDOW[1], mode.number * min(kct_end, self.open_reach))
         linear = min(last, mode.number * self.linear_reach)
         if linear > first + LEAST_WINDOW:
@@ -174,12 +174,12 @@ class Growth:
 
         NaN when the history does not reach so far.
         """
-        problem = self.problem
-        kct = mode.number * get_kct(problem, history["t"])
+        shocked = self.shocked
+        kct = mode.number * get_kct(shocked, history["t"])
         if kct[-1] < last - 1e-6:
             return float("nan")
         grown = np.interp((first, last), kct, history[mode.column])
-        wavenumber = mode.number * problem.k
+        wavenumber = mode.number * shocked.k
         duration = (last - first) / (wavenumber * self.theory.sound_speed)
         return float((grown[1] - grown[0]) / duration / (wavenumber * mode.amplitude))
 
@@ -188,7 +188,7 @@ class Growth:
 
         A mode that changes its sign is nothing for a moment: that makes no line rough.
         """
-        modes = [mode for mode in self.problem.harmonics if mode.column in history]
+        modes = [mode for mode in self.shocked.harmonics if mode.column in history]
         now = np.max(np.abs([history[mode.column] for mode in modes]), axis=0)
         first = max(abs(mode.amplitude * self.theory.compression) for mode in modes)
         return np.asarray(history["roughness"]) / np.maximum(now, first)
@@ -197,7 +197,7 @@ class Growth:
     def model_fails(self) -> str:
         """Why the Padé model does not apply at all; "" where it does."""
         theory = self.theory
-        modes = self.problem.harmonics
+        modes = self.shocked.harmonics
         if len(modes) != 1:
             return "the Padé model is one of a single mode"
         if is_still(theory, theory.get_asymptotic_rate()):
@@ -215,9 +215,9 @@ class Growth:
     @functools.cached_property
     def model(self) -> PadeModel:
         """The Padé model of the one mode, from the linear asymptotic rate."""
-        (mode,) = self.problem.harmonics
+        (mode,) = self.shocked.harmonics
         theory = self.theory
-        wavenumber = mode.number * self.problem.k
+        wavenumber = mode.number * self.shocked.k
         start = abs(mode.amplitude)
         rate = abs(theory.get_asymptotic_rate()) * wavenumber * start
         rate /= self.find_reduction(mode.number)
@@ -228,12 +228,12 @@ class Growth:
         """k c t (k of the wavelength) up to which the Padé model can be right; 0 where nowhere."""
         if self.model_fails:
             return 0.0
-        own = self.model.reach * self.problem.k * self.theory.sound_speed
+        own = self.model.reach * self.shocked.k * self.theory.sound_speed
         return min(own, self.open_reach)
 
     def compute_model(self, t: np.ndarray) -> np.ndarray:
         """Amplitude by the Padé model at the times t (n,)."""
-        return self.model.compute_amplitude(np.maximum(np.asarray(t) - self.problem.arrival, 0.0))
+        return self.model.compute_amplitude(np.maximum(np.asarray(t) - self.shocked.arrival, 0.0))
 
 
 FEW_CELLS = 16  # in a wave: shorter ones grow by more than a twentieth less than theory
@@ -359,46 +359,44 @@ def sort_cautions(
 FREE_CAPILLARY_PHASE = 0.25
 
 
-def find_cautions(problem, run: RunSoFar) -> list[str]:
-    """Sentences for the deck of an `InterfaceInstability`; of a run that has begun, for it too."""
+def find_cautions(shocked: Shocked, run: RunSoFar) -> list[str]:
+    """Sentences for the deck of a shocked interface; of a run that has begun, for it too."""
     cautions = (
-        [caution for some in sort_deck(problem) for caution in some] if problem.harmonics else []
+        [caution for some in sort_deck(shocked) for caution in some] if shocked.harmonics else []
     )
-    deck = problem.deck
-    base = problem.linear_growth.base
-    cautions += _caution_no_interface(problem) + _caution_few_points(problem)
-    cautions += _caution_steep_line(problem, run)
-    cautions += _caution_slow_roll(problem, run)
+    deck = shocked.deck
+    base = shocked.linear_growth.base
+    cautions += _caution_no_interface(shocked) + _caution_few_points(shocked)
+    cautions += _caution_steep_line(shocked, run)
+    cautions += _caution_slow_roll(shocked, run)
     for name in ("first", "second"):
         side = getattr(deck, name)
         label = side.material or f"the {name} material"
         cautions += caution_fit(
-            label, getattr(problem, f"eos_{name}"), max(base.p, problem.shock.p)
+            label, getattr(shocked, f"eos_{name}"), max(base.p, shocked.shock.p)
         )
     single = deck.second_shock is None
     tension = deck.line.tension
-    # waves that are back from the far ends before the run's end; where a run is to go on after its
-    # line, the ends that it was given are those of a tube
-    is_tube = problem.may_hand_over and deck.lengths is not None
-    if single and not is_tube:
+    # waves that are back from the far ends before the run's end
+    if single and not shocked.is_tube:
         cautions += [
             f"waves return to the interface from the far end of the {name} material at t = "
-            f"{t:.4g} s, k c t = {float(get_kct(problem, t)):.3g}: later growth is not that of an "
+            f"{t:.4g} s, k c t = {float(get_kct(shocked, t)):.3g}: later growth is not that of an "
             "open interface; for that run anew with longer `lengths`, or none and no run.t_set_up"
-            for name, t in problem.find_echoes().items()
-            if t < problem.t_end
+            for name, (t, _) in shocked.echoes.items()
+            if t < shocked.t_end
         ]
-    if tension and problem.harmonics:  # which is not in any theory here
-        number = problem.harmonics[-1].number
-        omega = math.sqrt(tension * (number * problem.k) ** 3 / (base.rho_left + base.rho_right))
-        if omega * (problem.t_end - problem.arrival) >= FREE_CAPILLARY_PHASE:
+    if tension and shocked.harmonics:  # which is not in any theory here
+        number = shocked.harmonics[-1].number
+        omega = math.sqrt(tension * (number * shocked.k) ** 3 / (base.rho_left + base.rho_right))
+        if omega * (shocked.t_end - shocked.arrival) >= FREE_CAPILLARY_PHASE:
             cautions.append(
                 f"surface tension makes waves of mode {number} oscillate with a period of "
                 f"{2.0 * math.pi / omega:.3g} s; the theories of growth ignore it and hold "
-                f"until t = {problem.arrival + FREE_CAPILLARY_PHASE / omega:.3g} s"
+                f"until t = {shocked.arrival + FREE_CAPILLARY_PHASE / omega:.3g} s"
             )
-    if run.begun and problem.harmonics and single:
-        cautions += _caution_line(problem, run.history)
+    if run.begun and shocked.harmonics and single:
+        cautions += _caution_line(shocked, run.history)
     return cautions
 
 
@@ -412,16 +410,16 @@ LEAST_MUSHROOM_CELLS = 64  # in a wavelength: with fewer the stem and the cap ar
 SLOW_ROLL_MACH = 0.05
 
 
-def _caution_no_interface(problem) -> list[str]:
+def _caution_no_interface(shocked: Shocked) -> list[str]:
     """That nothing can grow: one material on both sides, or a line without waves."""
     cautions = []
-    same = is_same_material(problem.eos_first, problem.eos_second)
-    if same and problem.rho_first == problem.rho_second:
+    same = is_same_material(shocked.eos_first, shocked.eos_second)
+    if same and shocked.rho_first == shocked.rho_second:
         cautions.append(
-            f"both materials are the same, of density {problem.rho_first:g}: there is no "
+            f"both materials are the same, of density {shocked.rho_first:g}: there is no "
             "interface, and theory has no growth; take another second.rho or material"
         )
-    if not problem.harmonics:
+    if not shocked.harmonics:
         cautions.append(
             "the interface is flat, with every ka0 0: there is no growth to measure; give a mode "
             "a ka0 such as 0.02"
@@ -429,13 +427,13 @@ def _caution_no_interface(problem) -> list[str]:
     return cautions
 
 
-def _caution_few_points(problem) -> list[str]:
+def _caution_few_points(shocked: Shocked) -> list[str]:
     """That the spline through the points of a line_file is another line than they make."""
-    if problem.file_line is None:
+    if shocked.file_line is None:
         return []
-    x = problem.file_line.points[0]
+    x = shocked.file_line.points[0]
     extent = float(np.ptp(x))
-    beyond = problem.file_line.measure_overshoot(problem.make_heights())
+    beyond = shocked.file_line.measure_overshoot(shocked.heights)
     if beyond <= MOST_OVERSHOOT * extent:
         return []
     return [
@@ -445,22 +443,23 @@ def _caution_few_points(problem) -> list[str]:
     ]
 
 
-def _caution_steep_line(problem, run: RunSoFar) -> list[str]:
+def _caution_steep_line(shocked: Shocked, run: RunSoFar) -> list[str]:
     """That the first line is steeper than any that was compared, or that few cells carry it."""
-    deck = problem.deck
-    slope = problem.k * problem.amplitude
+    deck = shocked.deck
+    slope = shocked.k * shocked.amplitude
     cautions = []
     if slope > MOST_COMPARED_KA:
         cautions.append(
             f"the first line has k a0 = {slope:.3g}, {slope / (2.0 * math.pi):.2g} wavelengths; "
             f"lines beyond {MOST_COMPARED_KA:g} were never compared with theory or experiment"
         )
-    refining = "" if problem.may_hand_over else " or refine = true"
-    most = problem.k * run.most("amplitude") if run.begun else 0.0
+    refining = "" if shocked.may_hand_over else " or refine = true"
+    rows = shocked.heights.size - 1
+    most = shocked.k * run.most("amplitude") if run.begun else 0.0
     if most > ROLLED_UP_KA and deck.cells < LEAST_MUSHROOM_CELLS and not deck.refine:
         cautions.append(
             f"the wave has grown to k a = {most:.3g} on {deck.cells} cells per wavelength, "
-            f"{problem.count_rows()} along the line: too few for a mushroom's stem and cap; take "
+            f"{rows} along the line: too few for a mushroom's stem and cap; take "
             f"cells = {2 * LEAST_MUSHROOM_CELLS}{refining}"
         )
     turns = run.history.get("largest_turn", [])
@@ -479,18 +478,18 @@ def _caution_steep_line(problem, run: RunSoFar) -> list[str]:
     return cautions
 
 
-def _caution_slow_roll(problem, run: RunSoFar) -> list[str]:
+def _caution_slow_roll(shocked: Shocked, run: RunSoFar) -> list[str]:
     """That a wave rolls up so slowly that the scheme damps its vortex."""
-    if not run.begun or problem.deck.limiter in LOW_MACH:
+    if not run.begun or shocked.deck.limiter in LOW_MACH:
         return []
     history = run.history
     amplitude = history["amplitude"]
     place = int(np.nanargmax(amplitude))
     passed = history["t"][place] - history["t"][0]
-    if problem.k * amplitude[place] <= ROLLED_UP_KA or passed <= 0.0:
+    if shocked.k * amplitude[place] <= ROLLED_UP_KA or passed <= 0.0:
         return []
     speed = (amplitude[place] - amplitude[0]) / passed
-    mach = float(speed / problem.linear_growth.sound_speed)
+    mach = float(speed / shocked.linear_growth.sound_speed)
     if mach >= SLOW_ROLL_MACH:
         return []
     return [
@@ -499,22 +498,22 @@ def _caution_slow_roll(problem, run: RunSoFar) -> list[str]:
     ]
 
 
-def sort_deck(problem) -> tuple[list[str], list[str]]:
+def sort_deck(shocked: Shocked) -> tuple[list[str], list[str]]:
     """Sentences on modes with few cells per wave, and others.
 
     By the shock's Mach number, the ratio of densities and the cells of the shortest mode.
     """
-    gases = [isinstance(eos, IdealGas) for eos in (problem.eos_first, problem.eos_second)]
+    gases = [isinstance(eos, IdealGas) for eos in (shocked.eos_first, shocked.eos_second)]
     materials = "gas" if all(gases) else "mixed" if any(gases) else "condensed"
-    ahead = problem.eos_first.sound_speed(problem.rho_first, problem.deck.pressure)
-    theory = problem.linear_growth
+    ahead = shocked.eos_first.sound_speed(shocked.rho_first, shocked.deck.pressure)
+    theory = shocked.linear_growth
     rate = theory.impulsive  # the scale alone: a check does not wait for the linear theory
     growth = 1.0 if is_still(theory, rate) else abs(rate / theory.base.u)
-    cells = problem.deck.cells
-    numbers = [mode.number for mode in problem.harmonics]
+    cells = shocked.deck.cells
+    numbers = [mode.number for mode in shocked.harmonics]
     least = cells / numbers[-1]
-    mach = problem.shock.shock_speed / float(ahead)
-    ratio = problem.rho_second / problem.rho_first
+    mach = shocked.shock.shock_speed / float(ahead)
+    ratio = shocked.rho_second / shocked.rho_first
     of_cells, others = sort_cautions(materials, mach, ratio, least, growth=growth)
     short = [number for number in numbers if cells < FEW_CELLS * number]
     if short:
@@ -529,11 +528,11 @@ def sort_deck(problem) -> tuple[list[str], list[str]]:
     return of_cells, others
 
 
-def _caution_line(problem, history) -> list[str]:
+def _caution_line(shocked: Shocked, history) -> list[str]:
     """Waves of a few cells on the line, while theory says that it is gentle."""
-    modes = [mode.column for mode in problem.harmonics if mode.column in history]
-    growth = Growth(problem)
-    kct = get_kct(problem, history["t"])
+    modes = [mode.column for mode in shocked.harmonics if mode.column in history]
+    growth = Growth(shocked)
+    kct = get_kct(shocked, history["t"])
     gentle = (kct > 1.0) & (kct <= min(growth.linear_reach, growth.open_reach))
     if "roughness" not in history or not modes or not gentle.any():  # of an earlier version, short
         return []

@@ -68,16 +68,17 @@ def find_percent(row):
 
 
 def test_the_window_ends_where_the_wave_is_steep():
-    gentle, steep = (Growth(make_problem(Mode(ka0=ka0), mach=2.0)) for ka0 in (0.02, 0.06))
-    (mode,) = gentle.problem.harmonics
+    problems = [make_problem(Mode(ka0=ka0), mach=2.0) for ka0 in (0.02, 0.06)]
+    gentle, steep = (Growth(problem.shocked) for problem in problems)
+    (mode,) = problems[0].harmonics
     assert gentle.find_window(mode, 30.0).last == 30.0
     assert gentle.find_window(mode, 6.5) is None
-    (mode,) = steep.problem.harmonics
+    (mode,) = problems[1].harmonics
     window = steep.find_window(mode, 30.0)
     assert window.linear and 7.0 < window.last < 30.0
     slope = 0.06 * predict_amplitude(steep.theory, window.last)
     assert slope == pytest.approx(steep.limit, rel=0.01) and 0.2 < steep.limit < 0.3
-    screen = steep.problem.summary(make_history(steep.problem), None)
+    screen = problems[1].summary(make_history(problems[1]), None)
     assert "theory, up to k a = 0.25, its limit" in find_row(screen, "(da/dt)")
     assert abs(find_percent(find_row(screen, "(da/dt)"))) < 0.05
     assert "Padé model, rough" in screen

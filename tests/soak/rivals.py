@@ -7,6 +7,7 @@ import shutil
 import time
 from pathlib import Path
 
+from shockgrid.runs.store.directory import RunDirectory
 from soak.child import Call, call
 from soak.kills import finish, has_deck
 from soak.small_runs import SMALL, TrialsOfRuns, compare, find_other_files, list_words
@@ -89,7 +90,8 @@ class Clocks(TrialsOfRuns):
         done = call(list_words(problem, path, *more), folder, before=spoil)
         if fault := find_fault(done, (0,)):
             return fault
-        stopped = "reached" in done.out and more and compare(whole, path).code
+        log = RunDirectory(path).log.read_text(encoding="utf-8")
+        stopped = "--max-wall 1h reached" in log and compare(whole, path).code
         if stopped:
             done = call(["restart", str(path), "-q"], folder, before=spoil)
             if fault := find_fault(done, (0,)):

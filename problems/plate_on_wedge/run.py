@@ -18,6 +18,7 @@ MET_LINE_SPACINGS = 0.5  # of the local spacing: lines as near as this have met
 BEHIND = (3, 9)  # faces behind the collision point between which pressure and angle are averaged
 SHOCK_ROWS = (2, 10)  # grid lines from the contact on which a shock's place is looked for
 HANGING_SPACINGS = 0.1  # spacings below its undisturbed height at which a free surface is a jet's
+CLOSED_NOTCH_SPACINGS = 0.02  # of the same: the sides of a notch a few nodes deep have met
 APART_NODES = 6  # nodes along a line that do not count as another part of it
 
 
@@ -254,6 +255,8 @@ class PlateRun(Simulation):
         away[np.abs(index[:, None] - index) < APART_NODES] = np.inf
         if (away.min(axis=1) < near).any():
             return "cavity closed: the free surface has met itself"
+        if has_closed_notch(free, CLOSED_NOTCH_SPACINGS * spacing):
+            return "cavity closed: the free surface has met itself at the root of the jet"
         return None
 
     def is_folded(self, free: np.ndarray, face: np.ndarray, near: np.ndarray) -> bool:
@@ -282,3 +285,36 @@ class PlateRun(Simulation):
         if math.isfinite(self.times["closed"]):
             self.finished = self.find_closure()
         self.finished = self.finished or self.find_arrival()
+
+
+def has_closed_notch(line: np.ndarray, near: np.ndarray) -> bool:
+    """Have the sides of a notch that is a few nodes deep met?
+
+    line (2, n): with the outside on its right; near (n,): distances [m].  The sides of a notch see
+    each other through the outside, those of a jet's tip through the body.
+    """
+    other_way = line[:, ::-1]
+    return _has_met_ahead(line, near, 1.0) or _has_met_ahead(other_way, near[::-1], -1.0)
+
+
+def _has_met_ahead(line: np.ndarray, near: np.ndarray, orientation: float) -> bool:
+    """Is a node as near to one of the next faces, through the outside of the line?
+
+    orientation: 1 where the outside is on the right, -1 where it is on the left.
+    """
+    along = line[:, 2:] - line[:, :-2]
+    outwards = orientation * np.array([along[1], -along[0]]) / np.hypot(*along)
+    faces = np.diff(line)
+    for apart in range(1, APART_NODES):
+        # of inner node k the face from k + apart on
+        face = faces[:, 1 + apart :]
+        count = face.shape[1]
+        way = line[:, 1 + apart : -1] - line[:, 1 : 1 + count]
+        part = np.clip(-np.sum(way * face, axis=0) / np.sum(face * face, axis=0), 0.0, 1.0)
+        way = way + part * face
+        distance = np.hypot(*way)
+        ahead = np.sum(outwards[:, :count] * way, axis=0)
+        # most of the way goes outwards
+        if ((distance < near[1 : 1 + count]) & (ahead > 0.5 * distance)).any():
+            return True
+    return False

@@ -21,6 +21,7 @@ from shockgrid.problems.plate_on_wedge.report import (
     measure_lead,
     measure_plateau,
 )
+from shockgrid.problems.plate_on_wedge.run import has_closed_notch
 from shockgrid.problems.references.hugoniot import release, shock_to_pressure
 from shockgrid.regrid.measure.quality import least_corner_area
 from shockgrid.runs.cli.main import main
@@ -195,3 +196,11 @@ def test_a_restart_has_the_same_end(phase, tmp_path, monkeypatch, capfd):
     code = main(["compare", "whole", "other"])
     text = capfd.readouterr().out
     assert (code, text.splitlines()[-1]) == (0, "no difference between whole and other"), text
+
+
+@pytest.mark.parametrize(("depth", "closed"), [(1.0, True), (-1.0, False)])
+@pytest.mark.parametrize("width", [0.01, 0.1])
+def test_a_notch_closes_and_the_tip_of_a_jet_does_not(depth, closed, width):
+    """The outside is below: a notch goes up into the plate, a jet hangs down from it."""
+    line = np.array([[0.0, 1.0, 2.0, 2.0, 2.0 + width, 3.0, 4.0], [0, 0, 0, depth, 0, 0, 0]])
+    assert has_closed_notch(line, np.full(7, 0.02)) == (closed and width < 0.02)

@@ -28,10 +28,14 @@ MOST_LEFT_PART = 1e-9  # of the volume of both blocks, outside the new grid or n
 Assemble = Callable[[np.ndarray, dict[str, Any]], tuple[list[Block], list, Callable[[], object]]]
 
 
-def cut_block(block: Block, new_nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def cut_block(
+    block: Block, new_nodes: np.ndarray, period: float | None
+) -> tuple[np.ndarray, np.ndarray, float]:
     """What the cells (mi, mj) of a new grid take of a block, and the volume left outside.
 
-    Returns conserved quantities (4, mi, mj) and volumes (mi, mj).
+    period: where its sides j_min and j_max are each other's image [m], along y; what is beyond one
+    side of the new grid comes in through the other.  Returns conserved quantities (4, mi, mj) and
+    volumes (mi, mj).
     """
     curved = block.geometry.curved
     volumes, centres = compute_cell_moments(block.nodes, curved)
@@ -39,20 +43,31 @@ def cut_block(block: Block, new_nodes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     fields = make_linear_fields(compute_conserved(block.eos, *held), block.nodes, centres)
     limit_slopes_to_states(block.eos, fields, block.nodes, centres)
     overlay = overlay_grids(block.nodes, centres, fields, new_nodes, curved)
-    left = float(np.abs(volumes - overlay.used[..., 0]).sum())
-    return np.moveaxis(overlay.taken, -1, 0), overlay.covered[..., 0], left
+    used, taken, covered = overlay.used, overlay.taken, overlay.covered
+    for shift in () if period is None else (period, -period):
+        image = new_nodes + np.array([0.0, shift])[:, None, None]
+        overlay = overlay_grids(block.nodes, centres, fields, image, curved)
+        used = used + overlay.used
+        taken = taken + overlay.taken
+        covered = covered + overlay.covered
+    left = float(np.abs(volumes - used[..., 0]).sum())
+    return np.moveaxis(taken, -1, 0), covered[..., 0], left
 
 
 def merge_states(
-    first: Sequence[Block], second: Sequence[Block], eos: Mixture, new_nodes: np.ndarray
+    first: Sequence[Block],
+    second: Sequence[Block],
+    eos: Mixture,
+    new_nodes: np.ndarray,
+    period: float | None = None,
 ) -> dict[str, Any]:
     """What cells of a block of two materials hold where blocks of the first and the second lay.
 
-    Returns rho, u, v, p, and both fractions, (mi, mj) each.  Raises BadInput where the new grid
-    (2, mi+1, mj+1) does not cover the same as all blocks together.
+    period: as of `cut_block`.  Returns rho, u, v, p, and both fractions, (mi, mj) each.  Raises
+    BadInput where the new grid (2, mi+1, mj+1) does not cover the same as all blocks together.
     """
-    content, volume, left = cut_blocks(first, new_nodes)
-    content_second, volume_second, left_second = cut_blocks(second, new_nodes)
+    content, volume, left = cut_blocks(first, new_nodes, period)
+    content_second, volume_second, left_second = cut_blocks(second, new_nodes, period)
     volumes, _ = compute_cell_moments(new_nodes, first[0].geometry.curved)
     short = float(np.abs(volumes - volume - volume_second).sum())
     if max(left + left_second, short) > MOST_LEFT_PART * volumes.sum():
@@ -81,12 +96,12 @@ def merge_states(
 
 
 def cut_blocks(
-    blocks: Sequence[Block], new_nodes: np.ndarray
+    blocks: Sequence[Block], new_nodes: np.ndarray, period: float | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """What `cut_block` finds of several blocks, added up in their order."""
-    content, volume, left = cut_block(blocks[0], new_nodes)
+    content, volume, left = cut_block(blocks[0], new_nodes, period)
     for block in blocks[1:]:
-        more_content, more_volume, more_left = cut_block(block, new_nodes)
+        more_content, more_volume, more_left = cut_block(block, new_nodes, period)
         content = content + more_content
         volume = volume + more_volume
         left += more_left
@@ -99,7 +114,8 @@ class Handover:
     time: from which on [s], None: when the flow cannot go on otherwise; eos: of both materials;
     make_nodes: gives the grid (2, ni+1, nj+1) for all blocks; assemble: makes the new block with
     its sides and what makes its regridder; name: of the block; joined: labels of materials that
-    become one, and its label; following: spaces the sides of the new block.  Blocks of the first
+    become one, and its label; following: spaces the sides of the new block; period: of the flow
+    along y [m], None: it has none.  Blocks of the first
     material are those with the material of the first block, or with its equation of state where
     the two differ.
     """
@@ -113,6 +129,7 @@ class Handover:
         name: str,
         joined: Mapping[str, str] | None = None,
         following: ZoneFollowing | None = None,
+        period: float | None = None,
     ):
         self.time = time
         self.eos = eos
@@ -121,6 +138,7 @@ class Handover:
         self.name = name
         self.joined = joined or {}
         self.following = following
+        self.period = period
         self.first_nodes: np.ndarray | None = None  # of the new block, when it is there
 
     def is_due(self, t: float) -> bool:
@@ -132,7 +150,7 @@ class Handover:
         nodes = self.make_nodes(blocks)
         first = [block for block in blocks if self._is_first(block, blocks[0])]
         second = [block for block in blocks if not self._is_first(block, blocks[0])]
-        held = merge_states(first, second, self.eos, nodes)
+        held = merge_states(first, second, self.eos, nodes, self.period)
         return self._assemble(nodes, held)
 
     def _is_first(self, block: Block, leading: Block) -> bool:

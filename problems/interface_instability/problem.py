@@ -241,6 +241,8 @@ class InterfaceInstability(Results, Problem):
 
         kct = self.deck.handover_kct
         time = None if kct is None or self.is_captured else self.arrival + kct / self._rate
+        is_periodic = self.deck.sides == "periodic"
+        period = self.deck.width * self.deck.wavelength if is_periodic else None
         following = None
         if not self.is_captured:
             usual = self.deck.wavelength / self.deck.cells
@@ -253,6 +255,7 @@ class InterfaceInstability(Results, Problem):
             self._assemble_zone,
             ZONE_BLOCK,
             following=following,
+            period=period,
         )
 
     def _make_zone_nodes(self, blocks: Sequence[Block]) -> np.ndarray:
@@ -762,10 +765,11 @@ class InterfaceInstability(Results, Problem):
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
         first = evolution.blocks[0]
+        rows = self.make_heights(), self.deck.sides == "periodic"
         far = {"far_transverse_speed": max(map(measure_far_speed, evolution.blocks))}
         if first.name == ZONE_BLOCK:
             contact = measure_contact(first, self.k, self.followed)
-            return contact | far | measure_zone(first, self.make_heights())
+            return contact | far | measure_zone(first, *rows)
         line = first.nodes[:, -1, :]
         mean, most, least, roughness, turn = measure_shape(
             line, self.k, self._numbers, self.deck.sides == "wall"
@@ -779,7 +783,7 @@ class InterfaceInstability(Results, Problem):
             "roughness": roughness,
             "largest_turn": math.degrees(turn),
             **far,
-            **(measure_line(evolution.blocks, self.make_heights()) if self.may_hand_over else {}),
+            **(measure_line(evolution.blocks, *rows) if self.may_hand_over else {}),
         }
 
     def cautions(self, run) -> list[str]:

@@ -189,24 +189,29 @@ def add_to_rows(nodes, amounts, heights, rows):
                     rows[row] += density * shared
 
 
-def measure_circulation(blocks: Any, heights: np.ndarray) -> float:
+def measure_circulation(blocks: Any, heights: np.ndarray, is_periodic: bool = False) -> float:
     """The greatest circulation [m2/s] around rows from far side to far side.
 
-    blocks: one, or several side by side along i; heights (n + 1,): between the rows.  Two lines
-    along x, joined at both far sides, where nothing moves along them, go around all vortices in
-    between; the two are chosen between which these turn the most one way.
+    blocks: one, or several side by side along i; heights (n + 1,): between the rows; is_periodic:
+    what lies above them is that below.  Two lines along x, joined at both far sides, where nothing
+    moves along them, go around all vortices in between; the two are chosen between which these turn
+    the most one way.
     """
     flow = np.zeros(heights.size - 1)
+    period = float(heights[-1] - heights[0])
     for block in blocks:
-        add_to_rows(block.nodes, block.volume * block.u, heights, flow)
+        amounts = block.volume * block.u
+        add_to_rows(block.nodes, amounts, heights, flow)
+        for shift in (period, -period) if is_periodic else ():
+            add_to_rows(block.nodes, amounts, heights + shift, flow)
     along = flow / np.diff(heights)
     return find_peak(along, 1.0 / 12.0) + find_peak(-along, 1.0 / 12.0)
 
 
-def measure_zone(block: Any, heights: np.ndarray) -> dict[str, float]:
+def measure_zone(block: Any, heights: np.ndarray, is_periodic: bool) -> dict[str, float]:
     """Integral width [m] of the mixing zone, circulation, and mass [kg/m] of what is mixed.
 
-    heights (n + 1,) [m]: between rows, for the circulation.
+    heights (n + 1,) [m]: between rows, for the circulation, and is_periodic: as there.
 
     The integral over x of 4 z (1 - z) with z the mean volume fraction at each x; and of
     4 y (1 - y), y the mass fraction, over the mass.
@@ -222,16 +227,16 @@ def measure_zone(block: Any, heights: np.ndarray) -> dict[str, float]:
     spread = (0.5 * (steps[1:] + steps[:-1])) ** 2 / 12.0
     return {
         "integral_width": float((4.0 * (profile * (1.0 - profile) - spread) * widths).sum()),
-        "circulation": measure_circulation([block], heights),
+        "circulation": measure_circulation([block], heights, is_periodic),
         "mixed_mass": float((4.0 * part * (1.0 - part) * mass).sum()),
     }
 
 
-def measure_line(blocks: Any, heights: np.ndarray) -> dict[str, float]:
+def measure_line(blocks: Any, heights: np.ndarray, is_periodic: bool) -> dict[str, float]:
     """What `measure_zone` measures, of a line between two blocks, where nothing is mixed."""
     return {
         "integral_width": measure_line_width(blocks[0].nodes[:, -1, :]),
-        "circulation": measure_circulation(blocks, heights),
+        "circulation": measure_circulation(blocks, heights, is_periodic),
         "mixed_mass": 0.0,
     }
 

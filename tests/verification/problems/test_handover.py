@@ -49,6 +49,17 @@ def test_masses_momentum_and_energy_stay_over_the_handover(keys, sides):
     assert np.isfinite(mean).all()
 
 
+def test_a_line_whose_ends_move_along_periodic_sides_is_handed_over_whole():
+    """What lies beyond one side of the new grid comes in through the other."""
+    tilted = {"modes": [Mode(ka0=0.5, phase=0.7)], "sides": "periodic", "width": 1.0}
+    history = march_problem(make_problem(cells=16, kct_end=5.0, handover_kct=3.0, **tilted))
+    assert history["mixed_mass"][-1] > 0.0
+    check_budget(history, limit=1e-12)
+    row = find_handover(history)
+    for name in ("integral_width", "circulation"):
+        assert abs(history[name][row] / history[name][row - 1] - 1.0) < 0.03, name
+
+
 @pytest.mark.slow
 def test_width_circulation_and_rate_go_on_over_the_handover():
     """One definition measures a line and a field: what changes is what the remapping changes."""

@@ -765,15 +765,18 @@ class InterfaceInstability(Results, Problem):
     def measure(self, evolution: Simulation) -> dict[str, float]:
         """Amplitudes and places of the interface, and transverse motion in the far field."""
         first = evolution.blocks[0]
-        rows = self.make_heights(), self.deck.sides == "periodic"
+        is_periodic = self.deck.sides == "periodic"
         far = {"far_transverse_speed": max(map(measure_far_speed, evolution.blocks))}
         if first.name == ZONE_BLOCK:
             contact = measure_contact(first, self.k, self.followed)
-            return contact | far | measure_zone(first, *rows)
+            return contact | far | measure_zone(first, self.make_heights(), is_periodic)
         line = first.nodes[:, -1, :]
         mean, most, least, roughness, turn = measure_shape(
-            line, self.k, self._numbers, self.deck.sides == "wall"
+            line, self.k, self._numbers, not is_periodic
         )
+        zone = {}
+        if self.may_hand_over:
+            zone = measure_line(evolution.blocks, self.make_heights(), is_periodic)
         return {
             "interface_mean": mean,
             "interface_max": most,
@@ -783,7 +786,7 @@ class InterfaceInstability(Results, Problem):
             "roughness": roughness,
             "largest_turn": math.degrees(turn),
             **far,
-            **(measure_line(evolution.blocks, *rows) if self.may_hand_over else {}),
+            **zone,
         }
 
     def cautions(self, run) -> list[str]:

@@ -65,7 +65,9 @@ WEIGHT_BEFORE, WEIGHT_AFTER, WEIGHT_BELOW, WEIGHT_ABOVE = range(4)
 LINE_I_X, LINE_I_Y, LINE_J_X, LINE_J_Y, INVERSE_AREA = range(4, 9)
 CORNER_X = 9
 CORNER_Y = 13
-METRIC_ROWS = 17
+# axisymmetric solids: vectors between the middles of opposite faces
+MIDDLE_I_X, MIDDLE_I_Y, MIDDLE_J_X, MIDDLE_J_Y = range(17, 21)
+METRIC_ROWS = 21
 
 NO_SIDES = np.zeros((0, 3), dtype=np.int64)  # stands for the open sides of a block
 NO_RATES = np.zeros((1, 1, 1))  # stands for the rates of a fluid
@@ -171,6 +173,9 @@ def make_predict(
         line_i, line_j, area = compute_line_geometry(a, b, c, d)
         inverse = 1.0 / area
         if curved:
+            if is_solid:
+                metrics[MIDDLE_I_X, j], metrics[MIDDLE_I_Y, j] = line_i
+                metrics[MIDDLE_J_X, j], metrics[MIDDLE_J_Y, j] = line_j
             twist, y = find_twist(a, b, c, d)
             line_i, line_j = lean_lines(line_i, line_j, twist, y)
             inverse = 1.0 / (line_i[0] * line_j[1] - line_i[1] * line_j[0])

@@ -16,6 +16,10 @@ from shockgrid.hydro.carried.transport import (
     LINE_I_Y,
     LINE_J_X,
     LINE_J_Y,
+    MIDDLE_I_X,
+    MIDDLE_I_Y,
+    MIDDLE_J_X,
+    MIDDLE_J_Y,
     SLOPE_PARTS,
     SLOPE_X,
     SLOPE_Y,
@@ -109,14 +113,19 @@ def make_fill_rates(geometry: Geometry):
         line_i = metrics[LINE_I_X, j], metrics[LINE_I_Y, j]
         line_j = metrics[LINE_J_X, j], metrics[LINE_J_Y, j]
         inverse = metrics[INVERSE_AREA, j]
+        middle_i = line_i
+        middle_j = line_j
+        if curved:  # the velocity is limited along and across the lines of the middles
+            middle_i = metrics[MIDDLE_I_X, j], metrics[MIDDLE_I_Y, j]
+            middle_j = metrics[MIDDLE_J_X, j], metrics[MIDDLE_J_Y, j]
         before = state[U, i, j + 1], state[V, i, j + 1]
         after = state[U, i + 2, j + 1], state[V, i + 2, j + 1]
         weights = metrics[WEIGHT_BEFORE, j], metrics[WEIGHT_AFTER, j]
-        u_i, v_i = limit_along(u, v, (before, after), weights, line_i)
+        u_i, v_i = limit_along(u, v, (before, after), weights, middle_i)
         below = state[U, i + 1, j], state[V, i + 1, j]
         above = state[U, i + 1, j + 2], state[V, i + 1, j + 2]
         weights = metrics[WEIGHT_BELOW, j], metrics[WEIGHT_ABOVE, j]
-        u_j, v_j = limit_along(u, v, (below, above), weights, line_j)
+        u_j, v_j = limit_along(u, v, (below, above), weights, middle_j)
         u_x, u_y = compute_gradient(u_i, u_j, line_i, line_j, inverse)
         v_x, v_y = compute_gradient(v_i, v_j, line_i, line_j, inverse)
         hoop = v / centres[1, i, j] if curved else 0.0

@@ -96,7 +96,7 @@ def find_step_limit(flow: Flow) -> dict[str, float | int]:
     """The fastest cell: its block, its indices, and how much it alone shortens the next step."""
     fastest = flow.small_cells.fastest
     return {
-        "shared_cells": flow.small_cells.changed,
+        "shared_cells": flow.small_cells.redistributed_count,
         "fastest_block": fastest.block,
         "fastest_i": fastest.i,
         "fastest_j": fastest.j,

@@ -439,7 +439,7 @@ class Simulation:
         ledger = self.ledger
         self.ledger = Ledger(blocks, self._joined)
         self.ledger.set_state(ledger.get_state())
-        self.small_cells = SmallCells(self._shared, self.small_cells.allowed, 0.0)
+        self.small_cells = SmallCells(self._shared, self.small_cells.allowed_fraction, 0.0)
         self._make_flow()
 
     def adopt_cells(self, state) -> None:

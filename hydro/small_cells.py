@@ -130,17 +130,17 @@ class SmallCells:
         self.redistributions = [BlockRedistribution(block) for block in blocks]
         self.blocks = blocks
         self.scanned: Sequence[Sequence[Any]] = []  # of all blocks, by `scan`
-        self.allowed = float(share)
+        self.allowed_fraction = float(share)
         self.start = start
-        self.part = 0.0  # `allowed`, or 0 before `start`: by `set_time`
-        self.counts = np.zeros(SIZE_BINS, dtype=np.int64)
-        self.kept = np.empty(max(block.ni * block.nj for block in blocks))
-        self.changed = 0
+        self.current_fraction = 0.0  # `allowed_fraction`, or 0 before `start`: by `set_time`
+        self._bin_counts = np.zeros(SIZE_BINS, dtype=np.int64)
+        self._members = np.empty(max(block.ni * block.nj for block in blocks))
+        self.redistributed_count = 0
         self.fastest = Fastest(0.0, 0, 0, 0)
 
     def set_time(self, t: float) -> None:
-        """Allow the fraction `allowed` of small cells from the time `start` on, none before it."""
-        self.part = self.allowed if t >= self.start else 0.0
+        """Allow the fraction `allowed_fraction` of small cells from `start` on, none before it."""
+        self.current_fraction = self.allowed_fraction if t >= self.start else 0.0
 
     def find_first_rate(self, t: float) -> float:
         """`find_rate` of states given at t [s]; all blocks must be on this rank and updated."""
@@ -174,14 +174,19 @@ class SmallCells:
         cut = self.blocks.cuts.get(number)
         if cut is None:
             fastest_cells = scan_state.entry(
-                block.totals.rows, block.totals.array, block.rates_new, block.crowding, self.part,
-                self.counts, self.kept,
+                block.totals.rows, block.totals.array, block.rates_new, block.crowding,
+                self.current_fraction, self._bin_counts, self._members,
             )  # fmt: skip
             block.totals.read_array()
             return fastest_cells
         most_crowded = np.inf
-        if self.part > 0.0:
-            options = self.part, SQUEEZED_CROWDING_RATIO, self.counts, self.kept
+        if self.current_fraction > 0.0:
+            options = (
+                self.current_fraction,
+                SQUEEZED_CROWDING_RATIO,
+                self._bin_counts,
+                self._members,
+            )
             most_crowded = find_most_crowded_of_bands(cut, *options)
         return (*scan_rates_of_bands(cut, most_crowded), block.totals.sum_up())
 
@@ -205,7 +210,7 @@ class SmallCells:
 
     def redistribute_states(self, rate: float, dt: float) -> None:
         """Redistribute the new states of cells above `rate`, for which `dt` is stable."""
-        self.changed = 0
+        self.redistributed_count = 0
         for redistribution in self.redistributions:
             # what is there is of the last step, or of this one before a retry
             redistribution.block.redistributed_cells = 0
@@ -228,7 +233,9 @@ class SmallCells:
         for number, cut in self.blocks.cuts.items():
             for array in list_redistributed_arrays(cut.block):
                 cut.return_rows(array, above[number])
-        self.changed = sum(int(count) for (count,) in self.blocks.exchange_rows(changed, 1))
+        self.redistributed_count = sum(
+            int(count) for (count,) in self.blocks.exchange_rows(changed, 1)
+        )
 
 
 def list_redistributed_arrays(block: Block) -> tuple[np.ndarray, ...]:

@@ -400,7 +400,7 @@ class Simulation:
         self.ledger = Ledger(blocks, self._joined)
         self.ledger.set_state(ledger.get_state())
         small = self.small_cells
-        self.small_cells = SmallCells(self._shared, small.allowed, small.start)
+        self.small_cells = SmallCells(self._shared, small.allowed_fraction, small.start)
         self._make_flow()
 
     def hand_over(self) -> None:

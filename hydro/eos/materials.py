@@ -120,8 +120,9 @@ def choose_strength(where: str, material: Material, choice: object) -> StrengthL
     if choice in kinds:
         return material.strengths[kinds.index(str(choice))]
     known = f"it has {', '.join(kinds)}" if kinds else "it has none"
+    missing = "law of strength" if choice is True else f"such law of strength, {choice!r}"
     raise BadInput(
-        f"{where}: the material has no such law of strength, {choice!r} ({known}); give a table, "
+        f"{where}: the material has no {missing} ({known}); give a table, "
         'such as { law = "perfect", shear_modulus = 27.6e9, yield_strength = 0.3e9 }'
     )
 

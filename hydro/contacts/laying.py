@@ -19,7 +19,7 @@ from shockgrid.regrid.jit import compiled_once, kernel
 # of a face's length: so far the leader's nodes may lie behind the follower's chords
 DEEP_NODE_PART = 0.05
 # the same within a face whose nodes do not lie on the leader's line, so that it is no chord of it
-LEFT_NODE_PART = 2e-3
+LEFT_NODE_PART = 1e-4
 MOST_LAID = 0.3  # of a face's length: nodes that have gone further into the other body fail
 # of a face's length: nodes of both lines that lie so near each other are a pair
 MATCHED_NODE_DISTANCE = 1e-6

@@ -253,5 +253,5 @@ def test_nodes_of_the_leader_do_not_stay_behind_faces_that_are_no_chords():
     rows = march_whole(simulation)
     overlaps = [row["contact_overlap"] for row in rows[1:]]
     assert rows[-1]["contacts_made"] > 0
-    assert max(overlaps) < 0.02
+    assert max(overlaps) < 5e-3
     check_budget(rows, names=("energy",))

@@ -79,5 +79,6 @@ def test_solve_is_that_of_the_dense_matrix():
     vectors = np.zeros((6, 2, *shape))
     vectors[0][inner] = dense @ wanted
     cells.factor_lines(level.matrix)
-    assert 0 < cells.solve(level.matrix, vectors, 1e-10, 500) < 500
+    arrays = cells.make_solver_arrays(shape[1])
+    assert 0 < cells.solve(level.matrix, vectors, arrays, 1e-10, 500) < 500
     assert np.allclose(vectors[1][inner], wanted, rtol=0.0, atol=1e-7)

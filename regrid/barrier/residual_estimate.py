@@ -747,8 +747,11 @@ def make_residual_check(parallel):
     """The residual check of a whole block, over its column chunks in turn or on threads."""
 
     @kernel(parallel=parallel)
-    def check_residual(nodes, grids, inputs, motion, stretches, totals, chunks):
+    def check_residual(nodes, grids, frame, inputs, motion, stretches, totals, chunks):
         """Estimate of the residual r·z, and marks of triangles at the block's corners.
+
+        `grids`: the old one and one that receives the new one, in their `frame`, which is not part
+        of `grids` because numba hands threads no tuple within a tuple.
 
         `chunks`: their first node columns (chunks + 1), extremes (chunks, 5) and scratch (chunks,
         RESIDUAL_ROWS or more); extremes[0] receives the overall result.  Sums are over columns in
@@ -758,7 +761,7 @@ def make_residual_check(parallel):
         count = columns.shape[0] - 1
         for c in prange(count):
             estimate_residual(
-                nodes, grids, inputs, motion, stretches, totals,
+                nodes, (grids[0], grids[1], frame), inputs, motion, stretches, totals,
                 (columns[c], columns[c + 1], extremes[c], scratch[c]),
             )  # fmt: skip
         # over all chunks

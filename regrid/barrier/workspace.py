@@ -237,7 +237,7 @@ class Workspace:
         self.trial = self.trial_array
         self.frame = UPRIGHT
         # the old grid, the one to fill, and the frame of both, if that is not the workspace's
-        self.framed_grids: tuple[np.ndarray, np.ndarray, tuple[bool, bool]] | None = None
+        self.framed_grids: tuple[np.ndarray, np.ndarray] | None = None
 
     def take(
         self, previous, boundary, transposed, mirrored, sound=None, into=None, first_grid=None
@@ -263,7 +263,7 @@ class Workspace:
             load_grid(boundary, self.sides, *self.frame, inside=False)
             if previous is not None:
                 load_grid(previous, self.old, *self.frame, inside=False)
-                self.framed_grids = (previous, self.into, self.frame)
+                self.framed_grids = (previous, self.into)
         if sound is not None:
             self.sound = np.ascontiguousarray(sound.T) if transposed else sound
         self.spacing = None
@@ -408,12 +408,15 @@ class Workspace:
         check_residual = check_residual_serial
         if self._set_threads():
             check_residual = check_residual_threaded
-        grids = (self.old, self.base, UPRIGHT)
+        grids = (self.old, self.base)
+        frame = UPRIGHT
         if self.framed_grids is not None:
             grids = self.framed_grids
+            frame = self.frame
         total, self.marks = check_residual.entry(
-            self.base, grids, self.inputs, self.motion, (self.coarse.starts_i, self.coarse.sums),
-            self.totals, (self.columns, self.extremes, self.scratch),
+            self.base, grids, frame, self.inputs, self.motion,
+            (self.coarse.starts_i, self.coarse.sums), self.totals,
+            (self.columns, self.extremes, self.scratch),
         )  # fmt: skip
         extremes = self.extremes[0]
         is_convex = extremes[LEAST_SCALED] > 0.0

@@ -45,15 +45,16 @@ class KernelCache:
 
     cache_path = None  # numba wants one
 
-    def __init__(self, function: FunctionType):
+    def __init__(self, function: FunctionType, options: dict):
         self._function = function
+        self._options = str(sorted(options.items()))  # serial and on threads are of the same text
 
     @functools.cached_property
     def _contents(self) -> str:
         return compute_contents_digest(self._function)
 
     def _find(self, types, context) -> Path:
-        return find_kept(self._function.__name__, self._contents, str(types))
+        return find_kept(self._function.__name__, self._contents, self._options, str(types))
 
     def load_overload(self, types, context):
         with contextlib.suppress(Exception):  # what another release of numba has written
@@ -129,7 +130,7 @@ def _compile_or_interpret(compiled: Dispatcher, *arguments):
 def make_kernel(function, options: dict):
     """A function that numba compiles, with the cache and the first calls of this file."""
     compiled = numba.njit(**options)(function)
-    compiled._cache = KernelCache(compiled.py_func)
+    compiled._cache = KernelCache(compiled.py_func, options)
     compiled._compile_for_args = functools.partial(_compile_or_interpret, compiled)
     compiled.entry = compiled
     return compiled

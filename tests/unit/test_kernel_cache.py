@@ -298,3 +298,14 @@ def test_what_was_computed_is_remembered_until_its_file_is_damaged(tmp_path, mon
         contents[-5] ^= 1
         file.write_bytes(contents)
     assert remember("a") == [1.0, 2.0] and asked == ["a", "a", "b", "a"]
+
+
+def test_one_text_with_two_options_has_two_machine_codes(tmp_path, monkeypatch):
+    # in a forked process the code that is compiled for threads ends a run
+    def double(x):
+        return 2.0 * x
+
+    monkeypatch.setenv("SHOCKGRID_CACHE_DIR", str(tmp_path))
+    for error_model in ("python", "numpy"):
+        assert kernel(error_model=error_model)(double)(1.0) == 2.0
+    assert len(list((tmp_path / "kernels").iterdir())) == 2

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
 import threading
 
 import pytest
+from numba import types
+from numba.core.dispatcher import Dispatcher
 
+import shockgrid as sg
 from builders import ROOT
 from shockgrid.hydro.workers import Workers
 
@@ -95,3 +99,25 @@ def test_a_forked_process_computes_the_same_without_threads():
     command = [sys.executable, "-c", FORKED]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=500)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def count_levels(kind) -> int:
+    """How deep tuples lie within each other in a numba type: 1 for a tuple of arrays."""
+    if not isinstance(kind, types.BaseTuple):
+        return 0
+    return 1 + max((count_levels(part) for part in kind.types), default=0)
+
+
+@pytest.mark.kernels
+def test_kernels_on_threads_receive_no_tuple_within_a_tuple():
+    # numba compiles a loop over threads with such a tuple or refuses it, by the order of a set
+    sg.load("interface-instability", cells=128, run={"threads": 2}).advance(2)
+    signatures = {
+        kernel.py_func.__name__: kernel.signatures
+        for kernel in gc.get_objects()
+        if isinstance(kernel, Dispatcher) and kernel.targetoptions.get("parallel")
+    }
+    assert len(signatures.get("check_residual", ())) == 1
+    for name, called in signatures.items():
+        for kinds in called:
+            assert max(count_levels(kind) for kind in kinds) <= 1, name

@@ -165,7 +165,9 @@ def add_coarse(nodes, starts_i, lines, out):
     """
     nj = nodes.shape[2] - 1
     for k in range(2):
-        out[k, 0] = nodes[k, 0]
+        # sides node by node: where grids are no whole arrays, a row would be copied in between
+        for j in range(nj + 1):
+            out[k, 0, j] = nodes[k, 0, j]
         for coarse_i in range(starts_i.shape[0] - 1):
             begin = starts_i[coarse_i]
             end = starts_i[coarse_i + 1]
@@ -186,7 +188,9 @@ def add_coarse(nodes, starts_i, lines, out):
                     beta = first_beta[j] + passed * (second_beta[j] - first_beta[j])
                     motion = alpha * (after[j] - before[j]) + beta * (here[j + 1] - here[j - 1])
                     row[j] = here[j] + 0.5 * motion
-        out[k, starts_i[-1]] = nodes[k, starts_i[-1]]
+        last = starts_i[-1]
+        for j in range(nj + 1):
+            out[k, last, j] = nodes[k, last, j]
 
 
 def _cut(memory: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -17,26 +17,13 @@ import numpy as np
 from reference_sliding import (
     SlidingContact,
     dot,
+    find_curve_normals,
     find_free_speed,
     find_points,
     find_positions,
     solve_contact,
     turn_right,
 )
-
-
-def find_curve_normals(line, positions):
-    """Normals, to the right, of the curve that a line stands for; of length 1 or a little less."""
-    normal = turn_right(np.diff(line))
-    normal = normal / np.hypot(*normal)
-    bend = 0.5 * np.clip(10.0 * (dot(normal[:, 1:], normal[:, :-1]) - 0.8), 0.0, 1.0)
-    start = normal.copy()
-    end = normal.copy()
-    change = bend * np.diff(normal)
-    start[:, 1:] -= change
-    end[:, :-1] += change
-    face = np.minimum(positions.astype(int), normal.shape[1] - 1)
-    return start[:, face] + (positions - face) * (end - start)[:, face]
 
 
 class BodyContact(SlidingContact):

@@ -59,6 +59,20 @@ def find_mean(before, after):
     return np.where(np.sum(before * after, axis=0) > 0.0, mean, 0.0)
 
 
+def find_curve_normals(line, positions):
+    """Normals, to the right, of the curve that a line stands for; of length 1 or a little less."""
+    normal = turn_right(np.diff(line))
+    normal = normal / np.hypot(*normal)
+    bend = 0.5 * np.clip(10.0 * (dot(normal[:, 1:], normal[:, :-1]) - 0.8), 0.0, 1.0)
+    start = normal.copy()
+    end = normal.copy()
+    change = bend * np.diff(normal)
+    start[:, 1:] -= change
+    end[:, :-1] += change
+    face = np.minimum(positions.astype(int), normal.shape[1] - 1)
+    return start[:, face] + (positions - face) * (end - start)[:, face]
+
+
 class SlidingContact:
     """A contact in a step; `one` and `two` are the sides of leader and follower."""
 
@@ -102,15 +116,7 @@ class SlidingContact:
         self.sweep = dot(find_points(moved, middles), self.area) / self.dt
         self.point = find_points(line, middles)
         # normals of the curve that the line stands for: at nodes means, but for sharp corners
-        normal = self.sign * turn_right(np.diff(line))
-        normal = normal / np.hypot(*normal)
-        bend = 0.5 * np.clip(10.0 * (dot(normal[:, 1:], normal[:, :-1]) - 0.8), 0.0, 1.0)
-        start = normal.copy()
-        end = normal.copy()
-        change = bend * np.diff(normal)
-        start[:, 1:] -= change
-        end[:, :-1] += change
-        turned = start[:, self.leader] + (middles - self.leader) * (end - start)[:, self.leader]
+        turned = self.sign * find_curve_normals(line, middles)
         self.normal = turned / np.hypot(*turned)
         return positions
 

@@ -1,5 +1,5 @@
 """What a run costs: memory and disk before it starts, the time left, and that its steps become
-short.  docs/cost.md says how.
+short.  docs/performance.md says how.
 """
 
 from __future__ import annotations

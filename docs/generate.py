@@ -7,7 +7,7 @@
 A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`:
 
     head PROBLEM                docstring of the problem's module
-    verify PROBLEM...           rows of results/verify.json ("first": one of each problem)
+    verify PROBLEM...           finest grids of results/verify.json ("first": one of each problem)
     runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
     sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
     output NAME                 the command and its output: a run's summary, a study's orders
@@ -226,25 +226,21 @@ def fill_sizes(arguments: str) -> list[str]:
 
 
 def fill_verify(arguments: str) -> list[str]:
-    """Rows of the named problems; for `first` each problem's first quantity on its finest grid."""
-    records = read_result("verify")["rows"]
-    if arguments.strip() == "first":
-        leading = {}  # by problem
-        for record in records:
-            lead = leading.setdefault(record["problem"], record)
-            if record["what"] == lead["what"]:
-                leading[record["problem"]] = record
-        return make_table(HEADS[:5], [format_record(record)[:5] for record in leading.values()])
+    """Quantities of the named problems on their finest grids; `first` of each problem only."""
     names = arguments.split()
-    shown = [head for head in HEADS if head not in ("met", "CPU s")]
-    if len(names) == 1:
+    first = names == ["first"]
+    finest = {}  # by problem and quantity, or by problem
+    for record in read_result("verify")["rows"]:
+        problem, what = record["problem"], record["what"]
+        lead = finest.get(problem, record) if first else record
+        if what == lead["what"] and (first or problem in names):
+            finest[problem if first else (problem, what)] = record
+    hidden = ("met", "CPU s", "threshold", "other results") if first else ("met", "CPU s")
+    shown = [head for head in HEADS if head not in hidden]
+    if len(names) == 1 and not first:
         shown.remove("problem")
-    rows = []
-    for record in records:
-        if record["problem"] in names:
-            cells = dict(zip(HEADS, format_record(record), strict=True))
-            rows.append([cells[head] for head in shown])
-    return make_table(shown, rows)
+    rows = [dict(zip(HEADS, format_record(one), strict=True)) for one in finest.values()]
+    return make_table(shown, [[row[head] for head in shown] for row in rows])
 
 
 def fill_output(arguments: str) -> list[str]:
@@ -255,18 +251,14 @@ def fill_output(arguments: str) -> list[str]:
 
 
 def fill_bench(arguments: str) -> list[str]:
-    """A table of the benchmarks, with the command and the machine; with a condition its rows."""
+    """A table of the benchmarks, with its command; with a condition its rows."""
     name, _, condition = arguments.strip().partition(" | ")
     file, _, table = name.rpartition(": ")
     found = read_result(file or "bench")[table]
-    rows = found["rows"]
-    said = f"`{found['command']}`"
-    if condition:
-        column, _, value = condition.partition("=")
-        rows = [row for row in rows if str(row[column]) == value]
-    elif "machine" in found:
-        said += f", {found['machine']}"
-    return [f"{said}.", "", *make_table(rows[0], [map(str, row.values()) for row in rows])]
+    column, _, value = condition.partition("=")
+    rows = [row for row in found["rows"] if not column or str(row[column]) == value]
+    table = make_table(rows[0], [map(str, row.values()) for row in rows])
+    return [f"`{found['command']}`.", "", *table]
 
 
 def fill_result(name: str) -> list[str]:

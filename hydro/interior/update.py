@@ -178,7 +178,13 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                     push = dt * share * Z[scratch.SOURCE_P + k]
                     if is_solid:
                         # the same of the stress: all of it per radian, the spread per depth
-                        hoop = (1.0 - share) * Z[scratch.STRESS_SPREAD + k]
+                        plane_area = (
+                            Z[scratch.MID_I_X + k] * Z[scratch.MID_J_Y + k]
+                            - Z[scratch.MID_I_Y + k] * Z[scratch.MID_J_X + k]
+                        )
+                        # on every ray of a sphere the same part of the faces' force (F20.11)
+                        part_of_faces = Z[scratch.Y_CENTRE + k] * plane_area / Z[scratch.VOLUME + k]
+                        hoop = (1.0 - share) * part_of_faces * Z[scratch.STRESS_SPREAD + k]
                         push = push + dt * (hoop - share * Z[scratch.STRESS_HOOP + k])
                     momentum_y = stretch_ring(momentum_y, push, lines, (mid_i, mid_j))
                     Z[scratch.LEVER + k] = lever

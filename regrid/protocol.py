@@ -21,21 +21,21 @@ from shockgrid.regrid.sides import SIDE_NAMES, get_sides
 
 @dataclass(frozen=True)
 class RegridReport:
-    """How one regrid went; every regridder fills every field.
+    """How one regrid went; what a regridder does not do or know stays at its default.
 
     `iterations` counts linear iterations (newton) or sweeps, `node_iterations` the nodes they
     touched.  `sub_moves` is the number of extra parts the boundary's motion was cut into, `rescues`
     the number of times an untangling was needed.  `least_corner_ratio` is the least new corner area
     relative to the old one at the same corner.  `residual` is the size of the gradient at the
-    start, relative to the terms it is made of.  `start` names the initial guess:
-    "previous", "displacement", "quasi-1d", "followed", "untangled", "halved".  `exempt_corners`
-    counts corner triangles left out because the boundary's own nodes turn them over, `triangles`
-    the block's corners that its sides make flat (`regrid.measure.corners`), `limited_nodes` the
-    nodes whose motion was cut short because a corner would have folded or a speed been too high.
-    `strayed` is
-    how far inner nodes are at most from where interpolation of the sides' motion puts them, in
-    heights of the old cells; None where the regridder does not know it.  `quality` is what
-    `regrid.measure.quality.measure_worst` says of the grid, where the regridder knows it.
+    start: with Newton's method in cells, with sweeps relative to its terms.  `start` names the
+    initial guess: "previous", "displacement", "transfinite", "quasi-1d", "followed", "untangled",
+    "halved".  `exempt_corners` counts corner triangles left out because the boundary's own nodes
+    turn them over, `triangles` the block's corners that its sides make flat
+    (`regrid.measure.corners`), `limited_nodes` the nodes whose motion was cut short because a
+    corner would have folded or a speed been too high.  `strayed` is how far inner nodes are at most
+    from where interpolation of the sides' motion puts them, in heights of the old cells; None where
+    the regridder does not know it.  `quality` is what `regrid.measure.quality.measure_worst` says
+    of the grid, where the regridder knows it.
     """
 
     iterations: int = 0

@@ -535,17 +535,17 @@ def subtract_across(start, block, col, here):
 
 
 @kernel
-def add_cell_terms(near_row, far_row, sound, numbers, cells, here, Z):
+def add_cell_terms(near_row, far_row, sound, coefficients, cells, here, Z):
     """Add gradient and Hessian of the terms of cells to those of a row (`fill_cell_blocks`).
 
-    x and y of the rows of nodes `near_row` and `far_row`, `sound` of its cells, `numbers` as
-    `functional.take_cell_numbers` gives them.
+    x and y of the rows of nodes `near_row` and `far_row`, `sound` of its cells, `coefficients` as
+    `functional.take_cell_coefficients` gives them.
     """
     for col in range(cells):
         low, up, near, far = take_edges(*near_row, *far_row, col)
         a, b = functional.find_mid_lines(low, up, near, far)
-        if functional.is_active(a, b, sound[col], numbers):
-            slope = functional.cell_slope(a, b, sound[col], numbers)
+        if functional.is_active(a, b, sound[col], coefficients):
+            slope = functional.cell_slope(a, b, sound[col], coefficients)
             blocks = functional.cell_blocks(a, b, slope)
             # A and B are the means of the cell's two edges in each direction
             less_xx = 0.25 * (blocks.aa_xx - blocks.bb_xx)
@@ -577,7 +577,7 @@ def make_corner(corner_terms):
     """The kernel for one corner of a row of cells; `corner_terms` gives its `CornerTerms`."""
 
     @kernel(allocates=False)
-    def fill_corner(a_rows, b_rows, inverse, slope, weight, numbers, out):
+    def fill_corner(a_rows, b_rows, inverse, slope, weight, coefficients, out):
         """Terms of one corner of a row of cells from its edges a along i and b along j.
 
         `a_rows` and `b_rows` begin with x, y, square and inverse length of the edges; `slope` is
@@ -588,7 +588,7 @@ def make_corner(corner_terms):
         for col in range(weight.shape[0]):
             a = take_block(a_rows, 0, col)
             b = take_block(b_rows, 0, col)
-            terms = corner_terms(a, b, inverse[col], slope[col], weight[col], numbers)
+            terms = corner_terms(a, b, inverse[col], slope[col], weight[col], coefficients)
             out[SLOPE_AX + col] = terms.slope_ax
             out[SLOPE_AY + col] = terms.slope_ay
             out[SLOPE_BX + col] = terms.slope_bx
@@ -675,7 +675,7 @@ def make_assembly(smooth):
             store_block(cosecants, COSECANT_1, col, Z)
 
     @inlined
-    def fill_corners(numbers, cells, Z):
+    def fill_corners(coefficients, cells, Z):
         """Gradient and second derivatives of each corner of a row of cells (R4.6, R4.7)."""
         for corner in range(4):
             # Corners 2 and 3 use the line edge one column on, 3 and 4 the far edge.
@@ -690,9 +690,9 @@ def make_assembly(smooth):
             weight = Z[WEIGHT : WEIGHT + cells]
             out = Z[term : term + CORNER_SPAN]
             if smooth:
-                fill_smoothed_corner(a_rows, b_rows, inverse, slope, weight, numbers, out)
+                fill_smoothed_corner(a_rows, b_rows, inverse, slope, weight, coefficients, out)
             else:
-                fill_barrier_corner(a_rows, b_rows, inverse, slope, weight, numbers, out)
+                fill_barrier_corner(a_rows, b_rows, inverse, slope, weight, coefficients, out)
 
     @kernel(allocates=False)
     def assemble(nodes, inputs, spread, first, last, H, gradient, Z):
@@ -705,7 +705,7 @@ def make_assembly(smooth):
         ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
         low = first - 1
         cells = last - first + 1
-        corner_numbers = functional.take_corner_numbers(inputs)
+        corner_coefficients = functional.take_corner_coefficients(inputs)
         begin_block(nodes, inputs, low, cells, Z)
         for i in range(ni):
             here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
@@ -715,7 +715,7 @@ def make_assembly(smooth):
             measure_corners(spread, cells, Z)
             drop_block_corners(i, low, cells, (ni, nj), Z)
             fill_cell_weights(i, inputs, smooth, low, cells, Z)
-            fill_corners(corner_numbers, cells, Z)
+            fill_corners(corner_coefficients, cells, Z)
             # gathered by cell, with the cost of narrow cells (R4.10)
             fill_cell_blocks(cells, here, Z)
             if not smooth and functional.has_cell_terms(inputs):
@@ -723,8 +723,8 @@ def make_assembly(smooth):
                 near_row = nodes[0, i, columns], nodes[1, i, columns]
                 far_row = nodes[0, i + 1, columns], nodes[1, i + 1, columns]
                 sound = inputs.sound[i, low : low + cells]
-                cell_numbers = functional.take_cell_numbers(inputs)
-                add_cell_terms(near_row, far_row, sound, cell_numbers, cells, here, Z)
+                cell_coefficients = functional.take_cell_coefficients(inputs)
+                add_cell_terms(near_row, far_row, sound, cell_coefficients, cells, here, Z)
             # gathered by node
             fill_line_blocks(cells, here, Z)
             if i > 0:

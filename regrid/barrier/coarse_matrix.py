@@ -170,7 +170,7 @@ def add_corners(a_row, b_row, a_g, b_g, inputs, count, Z):
     `a_row` and `b_row` are the rows of its edges along i and j, `a_g` and `b_g` those of their
     inverse lengths; D is positive.
     """
-    numbers = functional.take_corner_numbers(inputs)
+    coefficients = functional.take_corner_coefficients(inputs)
     for k in range(count):
         inverse_a = Z[a_g, k]
         inverse_b = Z[b_g, k]
@@ -179,7 +179,7 @@ def add_corners(a_row, b_row, a_g, b_g, inputs, count, Z):
         inverse = 1.0 / (ax * by - ay * bx)
         a = (ax, ay, 0.0, inverse_a)
         b = (bx, by, 0.0, inverse_b)
-        terms = functional.barrier_corner(a, b, inverse, 1.0, Z[WEIGHT, k], numbers)
+        terms = functional.barrier_corner(a, b, inverse, 1.0, Z[WEIGHT, k], coefficients)
         add_hessian(k, terms.hessian, Z)
 
 
@@ -199,13 +199,13 @@ def add_hessian(k, hessian, Z):
 
 
 @kernel(allocates=False)
-def add_cell_terms(numbers, count, Z):
+def add_cell_terms(coefficients, count, Z):
     """Add the Hessian of the terms of the gathered cells to T."""
     for k in range(count):
         low, up, near, far = take_gathered_edges(k, Z)
         a, b = functional.find_mid_lines(low, up, near, far)
-        if functional.is_active(a, b, Z[SOUND, k], numbers):
-            slope = functional.cell_slope(a, b, Z[SOUND, k], numbers)
+        if functional.is_active(a, b, Z[SOUND, k], coefficients):
+            slope = functional.cell_slope(a, b, Z[SOUND, k], coefficients)
             add_hessian(k, functional.cell_blocks(a, b, slope), Z)
 
 
@@ -329,7 +329,7 @@ def fill_coarse_matrix(nodes, inputs, starts_i, starts_j, matrix):
         add_corners(UP_X, FAR_X, UP_G, FAR_G, inputs, parts_j, Z)
         add_corners(LOW_X, FAR_X, LOW_G, FAR_G, inputs, parts_j, Z)
         if functional.has_cell_terms(inputs):
-            add_cell_terms(functional.take_cell_numbers(inputs), parts_j, Z)
+            add_cell_terms(functional.take_cell_coefficients(inputs), parts_j, Z)
         for k in range(parts_j):
             Z[BLOCK_AA, k] += Z[LINE_Q, k]
             Z[BLOCK_AA + 2, k] += Z[LINE_Q, k]

@@ -19,11 +19,11 @@ along j, at i and i + 1), here and in every file that calls these functions.
 What a new term touches.  The assembly of the Newton step, the residual check, untangling, the
 Hessian on coarse nodes and the sweeps know none of the formulas: they call those of this file.
 
-    of a corner   `corner_value`, `corner_slope`, `corner_hessian`; `CornerNumbers` and
-                  `take_corner_numbers` if it has numbers of its own
-    of a cell     `cell_value`, `cell_slope`, `cell_stiffness`, `cell_blocks`; `CellNumbers` and
-                  `take_cell_numbers`; `has_cell_terms`, `is_active`, `measure_activity` say where
-                  it acts, `without_cell_terms` leaves it out
+    of a corner   `corner_value`, `corner_slope`, `corner_hessian`; `CornerCoefficients` and
+                  `take_corner_coefficients` if it has coefficients of its own
+    of a cell     `cell_value`, `cell_slope`, `cell_stiffness`, `cell_blocks`;
+                  `CellCoefficients` and `take_cell_coefficients`; `has_cell_terms`, `is_active`,
+                  `measure_activity` say where it acts, `without_cell_terms` leaves it out
     of a line     `weigh_edge` (weight and length of an edge); a force along lines that is not
                   linear in the edges also `assembly.fill_line_edges` and `fill_near_blocks`,
                   `residual_estimate.add_row`, `untangle.add_line_energy` and
@@ -126,7 +126,7 @@ def find_least(corner_1, corner_2, corner_3, corner_4):
 # Terms of a corner: functions F of `size` and of D (or chi).
 
 
-class CornerNumbers(NamedTuple):
+class CornerCoefficients(NamedTuple):
     """Numbers of the terms of a corner: lam and c of the area term (R4.1), lam c and lam/c."""
 
     area_weight: float
@@ -136,7 +136,7 @@ class CornerNumbers(NamedTuple):
 
 
 # of (a² + b²)/D alone
-WITHOUT_AREA_TERM = CornerNumbers(0.0, 1.0, 0.0, 0.0)
+WITHOUT_AREA_TERM = CornerCoefficients(0.0, 1.0, 0.0, 0.0)
 
 
 class Hessian(NamedTuple):
@@ -168,11 +168,11 @@ class CornerTerms(NamedTuple):
 
 
 @inlined
-def take_corner_numbers(inputs):
-    """The `CornerNumbers` of a block; `inputs` are `BarrierInputs`."""
+def take_corner_coefficients(inputs):
+    """The `CornerCoefficients` of a block; `inputs` are `BarrierInputs`."""
     lam = inputs.area_weight
     c = inputs.area_target
-    return CornerNumbers(lam, c, lam * c, lam / c)
+    return CornerCoefficients(lam, c, lam * c, lam / c)
 
 
 @inlined
@@ -190,34 +190,34 @@ def smooth_area(area, e2):
 
 
 @inlined
-def corner_value(size, area, numbers):
+def corner_value(size, area, coefficients):
     """F of a corner with a² + b² = `size` and D = `area` (2 lam more than in R4.1).
 
-    `numbers` are its `CornerNumbers`, here as below.
+    `coefficients` are its `CornerCoefficients`, here as below.
     """
-    c = numbers.area_target
-    return size / area + numbers.area_weight * (area / c + c / area)
+    c = coefficients.area_target
+    return size / area + coefficients.area_weight * (area / c + c / area)
 
 
 @inlined
-def corner_slope(size, inverse, numbers):
+def corner_slope(size, inverse, coefficients):
     """dF/d size, m = dF/dD, and the stiffness of the corner; `inverse` is 1/D.
 
     The stiffness times b² is half the trace of the Hessian in a; times a², of that in b.
     """
-    share = inverse * inverse * (numbers.lam_c + size)
-    return inverse, numbers.lam_over_c - share, share * inverse
+    share = inverse * inverse * (coefficients.lam_c + size)
+    return inverse, coefficients.lam_over_c - share, share * inverse
 
 
 @inlined
-def corner_hessian(size, v, g, off, inverse, stiffness, numbers):
+def corner_hessian(size, v, g, off, inverse, stiffness, coefficients):
     """The Hessian of F times D/2 (R4.7, R4.18), with `v` and `g` as in the head of this file.
 
     `off` is 1 where `size` is w², else 0; `stiffness` is S of (R4.18).
     """
     (vax, vay), (vbx, vby) = v
     (gax, gay), (gbx, gby) = g
-    mu = (0.5 * stiffness) * (inverse * (size + numbers.lam_c))
+    mu = (0.5 * stiffness) * (inverse * (size + coefficients.lam_c))
     hax, hay = inverse * (vax - mu * gax), inverse * (vay - mu * gay)
     hbx, hby = inverse * (vbx - mu * gbx), inverse * (vby - mu * gby)
     return Hessian(
@@ -229,7 +229,7 @@ def corner_hessian(size, v, g, off, inverse, stiffness, numbers):
 
 
 @inlined
-def corner_terms(size, v, g, off, inverse, stiffness, scale, numbers):
+def corner_terms(size, v, g, off, inverse, stiffness, scale, coefficients):
     """The `CornerTerms` of one corner, weighted, with respect to its edges as they are.
 
     `scale` has the weight and the inverse conditional lengths of both edges.
@@ -237,8 +237,8 @@ def corner_terms(size, v, g, off, inverse, stiffness, scale, numbers):
     va, vb = v
     g_a, g_b = g
     weight, inverse_a, inverse_b = scale
-    size_slope, area_slope, _ = corner_slope(size, inverse, numbers)
-    hessian = corner_hessian(size, v, g, off, inverse, stiffness, numbers)
+    size_slope, area_slope, _ = corner_slope(size, inverse, coefficients)
+    hessian = corner_hessian(size, v, g, off, inverse, stiffness, coefficients)
     twice = 2.0 * size_slope
     # from edges over their conditional lengths to edges
     a = weight * inverse_a
@@ -258,7 +258,7 @@ def corner_terms(size, v, g, off, inverse, stiffness, scale, numbers):
 
 
 @inlined
-def barrier_corner(a, b, inverse, stiffness, weight, numbers):
+def barrier_corner(a, b, inverse, stiffness, weight, coefficients):
     """`corner_terms` of the functional itself, with w² for the size; `inverse` is 1/D.
 
     The edges a and b, over their conditional lengths: x, y, length squared, inverse conditional
@@ -270,24 +270,24 @@ def barrier_corner(a, b, inverse, stiffness, weight, numbers):
     v = ((wx, wy), (wy, -wx))
     g = ((by, -bx), (-ay, ax))
     scale = (weight, inverse_a, inverse_b)
-    return corner_terms(wx * wx + wy * wy, v, g, 1.0, inverse, stiffness, scale, numbers)
+    return corner_terms(wx * wx + wy * wy, v, g, 1.0, inverse, stiffness, scale, coefficients)
 
 
 @inlined
-def smoothed_corner(a, b, inverse, chi_slope, weight, numbers):
+def smoothed_corner(a, b, inverse, chi_slope, weight, coefficients):
     """`corner_terms` with D replaced by chi(D); `inverse` is 1/chi, `chi_slope` is chi'(D)."""
     ax, ay, a_square, inverse_a = a
     bx, by, b_square, inverse_b = b
     v = ((ax, ay), (bx, by))
     g = ((chi_slope * by, -chi_slope * bx), (-chi_slope * ay, chi_slope * ax))
     scale = (weight, inverse_a, inverse_b)
-    return corner_terms(a_square + b_square, v, g, 0.0, inverse, 1.0, scale, numbers)
+    return corner_terms(a_square + b_square, v, g, 0.0, inverse, 1.0, scale, coefficients)
 
 
 # Terms of a cell: functions of its mid-lines A and B.
 
 
-class CellNumbers(NamedTuple):
+class CellCoefficients(NamedTuple):
     """Numbers of the terms of cells: 2/R² and mu sigma of the cost (R4.10)."""
 
     cost_scale: float
@@ -341,38 +341,40 @@ def without_cell_terms(inputs):
 
 
 @inlined
-def take_cell_numbers(inputs):
-    """The `CellNumbers` of a block; `inputs` are `BarrierInputs`."""
-    return CellNumbers(inputs.cost_scale, inputs.cost_weight * inputs.sigma)
+def take_cell_coefficients(inputs):
+    """The `CellCoefficients` of a block; `inputs` are `BarrierInputs`."""
+    return CellCoefficients(inputs.cost_scale, inputs.cost_weight * inputs.sigma)
 
 
 @inlined
-def is_active(a, b, sound, numbers):
-    """Whether a term acts on a cell: rho > 1."""
-    return cell_rate(a, b, sound, numbers.cost_scale) > 1.0
+def is_active(a, b, sound, coefficients):
+    """Whether a term acts on a cell: whether its rate is above the one wanted."""
+    return cell_rate_ratio_squared(a, b, sound, coefficients.cost_scale) > 1.0
 
 
 @inlined
-def measure_activity(mid_squares, area, sound, numbers):
+def measure_activity(mid_squares, area, sound, coefficients):
     """More than 0 where `is_active`, without a division, for whole rows of cells.
 
     `mid_squares` is 4 (A² + B²), `area` 4 A × B.
     """
-    return ((4.0 * numbers.cost_scale) * mid_squares) * (sound * sound) - area * area
+    return ((4.0 * coefficients.cost_scale) * mid_squares) * (sound * sound) - area * area
 
 
 @inlined
-def cell_value(a, b, sound, numbers):
+def cell_value(a, b, sound, coefficients):
     """The value of all terms of a cell with the mid-lines `a` and `b`."""
-    return numbers.cost_weight * cost_value(cell_rate(a, b, sound, numbers.cost_scale))
+    return coefficients.cost_weight * cost_value(
+        cell_rate_ratio_squared(a, b, sound, coefficients.cost_scale)
+    )
 
 
 @inlined
-def cell_slope(a, b, sound, numbers):
+def cell_slope(a, b, sound, coefficients):
     """The `CellSlope` of a cell with the mid-lines `a` and `b`."""
-    rate_ratio = cell_rate(a, b, sound, numbers.cost_scale)
-    weight = numbers.cost_weight if rate_ratio > 1.0 else 0.0
-    cost = cost_slope(a, b, rate_ratio, sound, numbers.cost_scale, weight)
+    rate_ratio_squared = cell_rate_ratio_squared(a, b, sound, coefficients.cost_scale)
+    weight = coefficients.cost_weight if rate_ratio_squared > 1.0 else 0.0
+    cost = cost_slope(a, b, rate_ratio_squared, sound, coefficients.cost_scale, weight)
     p_slope = cost.p_slope
     return CellSlope(
         (p_slope * cost.rate_ax, p_slope * cost.rate_ay),
@@ -397,23 +399,26 @@ def cell_blocks(a, b, slope):
 
 
 @inlined
-def cell_rate(a, b, sound, scale):
-    """rho of (R4.10) of a cell with the mid-lines `a` and `b`; `scale` is 2/R²."""
+def cell_rate_ratio_squared(a, b, sound, scale):
+    """Square of a cell's rate over the wanted one, rho of (R4.10).
+
+    `a` and `b` are its mid-lines; `scale` is 2/R².
+    """
     ratio = sound / (a[0] * b[1] - a[1] * b[0])
     mid_squares = (a[0] * a[0] + a[1] * a[1]) + (b[0] * b[0] + b[1] * b[1])
     return (scale * mid_squares) * (ratio * ratio)
 
 
 @inlined
-def cost_value(rate_ratio):
-    """P of a cell over its weight, from rho = `rate_ratio`."""
-    rate_ratio = rate_ratio if rate_ratio > 1.0 else 1.0
-    return 2.0 * (np.log(rate_ratio) - (1.0 - 1.0 / rate_ratio))
+def cost_value(rate_ratio_squared):
+    """P of a cell over its weight."""
+    rate_ratio_squared = rate_ratio_squared if rate_ratio_squared > 1.0 else 1.0
+    return 2.0 * (np.log(rate_ratio_squared) - (1.0 - 1.0 / rate_ratio_squared))
 
 
 @inlined
-def cost_slope(a, b, rate_ratio, sound, scale, weight):
-    """The `CostSlope` of a cell with rho = `rate_ratio` > 1; `weight` = mu sigma."""
+def cost_slope(a, b, rate_ratio_squared, sound, scale, weight):
+    """The `CostSlope` of a cell with `rate_ratio_squared` > 1; `weight` = mu sigma."""
     ax, ay = a
     bx, by = b
     # rho and its slopes in A and B
@@ -422,7 +427,7 @@ def cost_slope(a, b, rate_ratio, sound, scale, weight):
     factor = (2.0 * scale) * (ratio * ratio)
     square_over_area = ((ax * ax + ay * ay) + (bx * bx + by * by)) * inverse_area
     # P' and P''
-    inverse_rate = 1.0 / rate_ratio
+    inverse_rate = 1.0 / rate_ratio_squared
     p_slope = (2.0 * weight) * ((1.0 - inverse_rate) * inverse_rate)
     p_curvature = (2.0 * weight) * ((2.0 * inverse_rate - 1.0) * (inverse_rate * inverse_rate))
     return CostSlope(

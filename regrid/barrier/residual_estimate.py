@@ -26,8 +26,8 @@ from numba import prange
 from shockgrid.regrid.algebraic import blend, load_curve_edges, subtract_curve_sides, take_blend
 from shockgrid.regrid.barrier.coarse_nodes import end_stretch
 from shockgrid.regrid.barrier.functional import (
-    CellNumbers,
-    CornerNumbers,
+    CellCoefficients,
+    CornerCoefficients,
     cell_slope,
     cell_stiffness,
     compute_barrier_strength,
@@ -41,8 +41,8 @@ from shockgrid.regrid.barrier.functional import (
     measure_activity,
     measure_edge,
     prepare_corners,
-    take_cell_numbers,
-    take_corner_numbers,
+    take_cell_coefficients,
+    take_corner_coefficients,
     take_corner_weight,
     weigh_edge,
 )
@@ -100,7 +100,7 @@ BLOCK_CORNER_MARK = -NO_LIMIT  # stands for the old area of the block's own corn
 MOST_SHRUNK, LEAST_SCALED, STRAYED, COSECANT, ASPECT = range(5)
 
 
-class RowNumbers(NamedTuple):
+class RowCoefficients(NamedTuple):
     """Numbers of the functional in a row of cells.
 
     Weight of a corner, how far the barrier may fade, its least sine and greatest strength, the
@@ -111,8 +111,8 @@ class RowNumbers(NamedTuple):
     growth: float
     least_sine: float
     strengthening: float
-    corner: CornerNumbers
-    cell: CellNumbers
+    corner: CornerCoefficients
+    cell: CellCoefficients
     area_target: float
 
 
@@ -321,7 +321,7 @@ def keep_extremes(col, least_area, most_shrunk, sharpest, Z):
 
 
 @inlined
-def measure_shape(col, edges, areas, numbers, Z):
+def measure_shape(col, edges, areas, coefficients, Z):
     """Keep the largest aspect ratio of a column, as a fraction; find whether a cell's terms act."""
     low, up, near, far = edges
     area_1, area_2, area_3, area_4 = areas
@@ -340,7 +340,7 @@ def measure_shape(col, edges, areas, numbers, Z):
     Z[SHORTER_MID + col] = shorter if is_larger else kept_shorter
     area = (area_1 + area_3) + (area_2 + area_4)
     Z[ACTIVITY + col] = measure_activity(
-        mid_i_square + mid_j_square, area, Z[SOUND + col], numbers.cell
+        mid_i_square + mid_j_square, area, Z[SOUND + col], coefficients.cell
     )
 
 
@@ -389,11 +389,11 @@ def store_edge_terms(col, edges, corners, weight, inverse_lengths, Z):
 
 
 @inlined
-def add_cell(col, numbers, Z):
+def add_cell(col, coefficients, Z):
     """Contributions of a cell's four corners to gradient and matrix along its edges; its quality.
 
     A corner of the block itself has BLOCK_CORNER_MARK as old area; it enters neither the compared
-    areas nor the weight, and its D is `area_target`.  `numbers` are `RowNumbers`.
+    areas nor the weight, and its D is `area_target`.  `coefficients` are `RowCoefficients`.
     """
     edges = take_edges(ROWS, col, Z)
     low, up, near, far = edges
@@ -413,7 +413,7 @@ def add_cell(col, numbers, Z):
     scale_3 = up_g * far_g
     scale_4 = low_g * far_g
     scaled = (scale_1 * area_1, scale_2 * area_2, scale_3 * area_3, scale_4 * area_4)
-    d1, d2, d3, d4 = replace_block_corners(scaled, old_areas, numbers.area_target)
+    d1, d2, d3, d4 = replace_block_corners(scaled, old_areas, coefficients.area_target)
     inverses, length_ratio = invert_areas((d1, d2, d3, d4), inverse_lengths)
     i1, i2, i3, i4 = inverses
     # squares of the edges over their lengths, and 1/sine² of the corners
@@ -433,14 +433,16 @@ def add_cell(col, numbers, Z):
         old_3 * (scale_3 * i3), old_4 * (scale_4 * i4),
     )  # fmt: skip
     keep_extremes(col, find_least(d1, d2, d3, d4), most_shrunk, sharpest, Z)
-    measure_shape(col, edges, areas, numbers, Z)
+    measure_shape(col, edges, areas, coefficients, Z)
     # weight of the cell (R4.3, R4.4), slopes of its corners
-    strength = compute_barrier_strength(sharpest, numbers.least_sine, numbers.strengthening)
-    weight = (numbers.corner_weight * strength) * fade(length_ratio, numbers.growth)
-    f1, m1, s1 = corner_slope(low_square + near_square, i1, numbers.corner)
-    f2, m2, s2 = corner_slope(up_square + near_square, i2, numbers.corner)
-    f3, m3, s3 = corner_slope(up_square + far_square, i3, numbers.corner)
-    f4, m4, s4 = corner_slope(low_square + far_square, i4, numbers.corner)
+    strength = compute_barrier_strength(
+        sharpest, coefficients.least_sine, coefficients.strengthening
+    )
+    weight = (coefficients.corner_weight * strength) * fade(length_ratio, coefficients.growth)
+    f1, m1, s1 = corner_slope(low_square + near_square, i1, coefficients.corner)
+    f2, m2, s2 = corner_slope(up_square + near_square, i2, coefficients.corner)
+    f3, m3, s3 = corner_slope(up_square + far_square, i3, coefficients.corner)
+    f4, m4, s4 = corner_slope(low_square + far_square, i4, coefficients.corner)
     area_slopes = (
         m1 * (weight * scale_1), m2 * (weight * scale_2),
         m3 * (weight * scale_3), m4 * (weight * scale_4),
@@ -450,10 +452,10 @@ def add_cell(col, numbers, Z):
 
 
 @kernel(allocates=False)
-def add_row_of_cells(numbers, cells, Z):
+def add_row_of_cells(coefficients, cells, Z):
     """`add_cell` for a number of cells."""
     for col in range(round_up(cells)):
-        add_cell(col, numbers, Z)
+        add_cell(col, coefficients, Z)
 
 
 @kernel(allocates=False)
@@ -512,32 +514,32 @@ def add_cells(i, inputs, shape, low, cells, Z):
         sound = inputs.sound[i, low : low + cells]
         for col in range(cells):
             Z[SOUND + col] = sound[col]
-    numbers = RowNumbers(
+    coefficients = RowCoefficients(
         take_corner_weight(inputs), inputs.along_i[GROWTH, i], inputs.least_sine,
-        inputs.strengthening, take_corner_numbers(inputs), take_cell_numbers(inputs),
+        inputs.strengthening, take_corner_coefficients(inputs), take_cell_coefficients(inputs),
         inputs.area_target,
     )  # fmt: skip
-    add_row_of_cells(numbers, cells, Z)
+    add_row_of_cells(coefficients, cells, Z)
     # few rows have cells that terms act on
     if with_cell_terms:
         active = 0
         for col in range(cells):
             active += 1 if Z[ACTIVITY + col] > 0.0 else 0
         if active > 0:
-            add_cell_terms(numbers.cell, cells, Z)
+            add_cell_terms(coefficients.cell, cells, Z)
 
 
 @kernel(allocates=False)
-def add_cell_terms(numbers, cells, Z):
+def add_cell_terms(coefficients, cells, Z):
     """Gradient of the terms of cells and half the trace of their blocks along edges.
 
-    `numbers` as `take_cell_numbers` gives them.
+    `coefficients` as `take_cell_coefficients` gives them.
     """
     for col in range(cells):
         if Z[ACTIVITY + col] > 0.0:
             low, up, near, far = take_edges(ROWS, col, Z)
             a, b = find_mid_lines(low, up, near, far)
-            slope = cell_slope(a, b, Z[SOUND + col], numbers)
+            slope = cell_slope(a, b, Z[SOUND + col], coefficients)
             stiffness_a, stiffness_b = cell_stiffness(a, b, slope)
             # half the traces of the blocks AA and BB, a quarter of them for each edge
             for edge, stiffness, edge_slope in (

@@ -178,11 +178,12 @@ class _SweepWork:
         self.scratch = np.zeros(SWEEP_ROWS)
         self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
+        self.exempt_corners = 0
 
     def begin(self, options: Sweeps) -> None:
         """Take the options of a regrid, and count anew."""
         self.options = options
-        self.sweeps = 0
+        self.sweeps_made = 0
         self.node_sweeps = 0
         self.sub_moves = 0
         self.rescues = 0
@@ -193,7 +194,7 @@ class _SweepWork:
     def report(self) -> RegridReport:
         """What the regrid took."""
         return RegridReport(
-            iterations=self.sweeps,
+            iterations=self.sweeps_made,
             node_iterations=self.node_sweeps,
             sub_moves=self.sub_moves,
             rescues=self.rescues,
@@ -321,7 +322,7 @@ class _SweepWork:
                 self.boxes = all_boxes
                 is_whole = True
                 continue
-            self.sweeps += 1
+            self.sweeps_made += 1
             self.node_sweeps += count_nodes(self.boxes)
             self._try_step(1.0)
             if sweep >= options.plain_sweeps:

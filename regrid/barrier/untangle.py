@@ -40,8 +40,8 @@ from shockgrid.regrid.barrier.functional import (
     has_cell_terms,
     prepare_corners,
     smooth_area,
-    take_cell_numbers,
-    take_corner_numbers,
+    take_cell_coefficients,
+    take_corner_coefficients,
     take_corner_weight,
     without_cell_terms,
 )
@@ -72,8 +72,8 @@ ENERGY_ROWS = ASSEMBLY_ROWS + 10 * CHUNK_SPAN
 
 
 @inlined
-def fill_corner_values(numbers, spread, cells, Z):
-    """Smoothed values and D of the four corners of a row of cells; `numbers`: `CornerNumbers`."""
+def fill_corner_values(coefficients, spread, cells, Z):
+    """Smoothed values and D of the four corners of a row of cells, by `CornerCoefficients`."""
     e2 = spread * spread
     for col in range(cells):
         areas, squares = prepare_corners(*take_scaled_edges(col, Z))
@@ -81,10 +81,10 @@ def fill_corner_values(numbers, spread, cells, Z):
         d1, d2, d3, d4 = areas
         low, up, near, far = squares
         values = (
-            corner_value(low + near, smooth_area(d1, e2)[0], numbers),
-            corner_value(up + near, smooth_area(d2, e2)[0], numbers),
-            corner_value(up + far, smooth_area(d3, e2)[0], numbers),
-            corner_value(low + far, smooth_area(d4, e2)[0], numbers),
+            corner_value(low + near, smooth_area(d1, e2)[0], coefficients),
+            corner_value(up + near, smooth_area(d2, e2)[0], coefficients),
+            corner_value(up + far, smooth_area(d3, e2)[0], coefficients),
+            corner_value(low + far, smooth_area(d4, e2)[0], coefficients),
         )
         store_block(values, VALUE_1, col, Z)
 
@@ -140,7 +140,7 @@ def add_row_energy(weight, barrier_row, is_inside, cells, Z):
 @inlined
 def add_cell_values(nodes, i, inputs, first, cells, Z):
     """Add the values of the terms of cells in row i to the energy of its columns."""
-    numbers = take_cell_numbers(inputs)
+    coefficients = take_cell_coefficients(inputs)
     x0 = nodes[0, i]
     y0 = nodes[1, i]
     x1 = nodes[0, i + 1]
@@ -149,7 +149,7 @@ def add_cell_values(nodes, i, inputs, first, cells, Z):
         j = first + col
         low, up, near, far = take_edges(x0, y0, x1, y1, j)
         a, b = find_mid_lines(low, up, near, far)
-        Z[ENERGY_ROW + col] += cell_value(a, b, inputs.sound[i, j], numbers)
+        Z[ENERGY_ROW + col] += cell_value(a, b, inputs.sound[i, j], coefficients)
 
 
 @kernel
@@ -161,7 +161,7 @@ def fill_energy(nodes, inputs, spread, barrier, first, last, Z):
     """
     ni, nj = nodes.shape[1] - 1, nodes.shape[2] - 1
     cells = last - first
-    numbers = take_corner_numbers(inputs)
+    coefficients = take_corner_coefficients(inputs)
     weight = take_corner_weight(inputs)
     for col in range(cells):
         Z[ENERGY_ROW + col] = 0.0
@@ -169,7 +169,7 @@ def fill_energy(nodes, inputs, spread, barrier, first, last, Z):
     begin_block(nodes, inputs, first, cells, Z)
     for i in range(ni):
         fill_row_edges(nodes, i, inputs, first, cells, Z)
-        fill_corner_values(numbers, spread, cells, Z)
+        fill_corner_values(coefficients, spread, cells, Z)
         drop_block_corners(i, first, last, (ni, nj), Z)
         fill_fading(inputs.along_i[GROWTH, i], cells, Z)
         if inputs.keeps_spacing:

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from shockgrid.regrid.barrier.functional import smooth_area
-from shockgrid.regrid.jit import kernel
+from shockgrid.regrid.jit import inlined, kernel
 
 SHARP_CORNER_SINE = 0.3  # corner sine below which the barrier is strengthened
 CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded
@@ -42,9 +42,9 @@ EDGE, INVERSE, STRAIGHT, SQUARE, OTHER_EDGE = (k * HEXAHEDRON_SPAN for k in (0, 
 VOLUME_ROW = 72 * HEXAHEDRON_SPAN
 OTHER_VOLUME = 80 * HEXAHEDRON_SPAN
 WEIGHT, SUM, LEAST = (k * HEXAHEDRON_SPAN for k in (88, 89, 90))  # of cells
-# where corners of two grids are compared
-LEAST_VOLUME = SUM
-LEAST_RATIO_ROW = LEAST
+# the same rows where corners of two grids are compared and nothing is summed
+LEAST_VOLUME_ROW = 89 * HEXAHEDRON_SPAN
+LEAST_RATIO_ROW = 90 * HEXAHEDRON_SPAN
 FLUX_ROW = 91 * HEXAHEDRON_SPAN  # of the eight edges, summed over corners
 HIGH_ROW = 115 * HEXAHEDRON_SPAN  # of those along i and j, from the cells before them
 # of cells: for the edge along i; summed over all three
@@ -644,17 +644,26 @@ def fill_product(nodes, direction, functional, out, Z):
             add_to_nodes(Z, OTHER_EDGE, i, j, n, out)
 
 
+@inlined
+def keep_less(least, value):
+    """The lesser of the two; NaN once either is NaN, which `min` would lose."""
+    takes_value = (value < least) | (value != value)
+    return value if takes_value else least
+
+
 @kernel(allocates=False)
 def compare_corners(nodes, old, inverse, shape, Z):
     """Smallest ratio of a corner's volume to that in `old`, and smallest scaled volume.
 
-    For a corner that is not positive in `old` the scaled volume replaces the ratio.
+    For a corner that is not positive in `old` the scaled volume replaces the ratio.  A volume that
+    is NaN makes both NaN.
     """
     n1, n2, n = shape
     padded = round_up(n)
     to_old = OTHER_VOLUME - VOLUME_ROW  # from a row of new volumes to that of old ones
     for k in range(padded):
-        Z[LEAST_RATIO_ROW + k] = Z[LEAST_VOLUME + k] = math.inf
+        Z[LEAST_RATIO_ROW + k] = math.inf
+        Z[LEAST_VOLUME_ROW + k] = math.inf
     for i in range(n1):
         for j in range(n2):
             fill_edges(nodes, inverse, i, j, EDGE, Z)
@@ -666,20 +675,15 @@ def compare_corners(nodes, old, inverse, shape, Z):
                     old_volume = Z[row + to_old + k]
                     Z[row + to_old + k] = old_volume if old_volume > 0.0 else 1.0
                 for k in range(padded):
-                    # not min(), which would lose a NaN
                     new_volume = Z[row + k]
-                    least_ratio = Z[LEAST_RATIO_ROW + k]
-                    least_volume = Z[LEAST_VOLUME + k]
                     ratio = new_volume / Z[row + to_old + k]
-                    Z[LEAST_RATIO_ROW + k] = least_ratio if least_ratio <= ratio else ratio
-                    Z[LEAST_VOLUME + k] = least_volume if least_volume <= new_volume else new_volume
+                    Z[LEAST_RATIO_ROW + k] = keep_less(Z[LEAST_RATIO_ROW + k], ratio)
+                    Z[LEAST_VOLUME_ROW + k] = keep_less(Z[LEAST_VOLUME_ROW + k], new_volume)
     least_ratio = math.inf
     least_volume = math.inf
     for k in range(n):
-        if not Z[LEAST_RATIO_ROW + k] >= least_ratio:
-            least_ratio = Z[LEAST_RATIO_ROW + k]
-        if not Z[LEAST_VOLUME + k] >= least_volume:
-            least_volume = Z[LEAST_VOLUME + k]
+        least_ratio = keep_less(least_ratio, Z[LEAST_RATIO_ROW + k])
+        least_volume = keep_less(least_volume, Z[LEAST_VOLUME_ROW + k])
     return least_ratio, least_volume
 
 

@@ -25,7 +25,7 @@ from shockgrid.regrid.sides import I_MAX, I_MIN, J_MAX, J_MIN, find_node, get_si
 LEAF_EDGES = 4  # edges of the smallest pieces
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)  # rows of the boxes
 NO_CROSSING = -1
-COINCIDENT_EDGES = -2
+EDGE_WITHOUT_LENGTH = -2
 # half planes that a piece's edges may run into
 GOES_RIGHT = 1
 GOES_LEFT = 2
@@ -51,7 +51,7 @@ def fill_boundary(nodes, line):
 
 
 @kernel
-def find_turn(a_x, a_y, b_x, b_y, c_x, c_y):
+def find_orientation(a_x, a_y, b_x, b_y, c_x, c_y):
     """1 where a, b, c turn left for certain, -1 right, 0 where rounding leaves it open."""
     left, right = (a_x - c_x) * (b_y - c_y), (a_y - c_y) * (b_x - c_x)
     area = left - right
@@ -82,14 +82,14 @@ def may_meet(line, a, b, count, closed):
     b_leads = (a == 0 and b == count - 1) or (closed and sx == px and sy == py)
     if b_follows:
         along = (px - qx) * (sx - qx) + (py - qy) * (sy - qy)
-        return along > 0.0 and find_turn(px, py, sx, sy, qx, qy) == 0
+        return along > 0.0 and find_orientation(px, py, sx, sy, qx, qy) == 0
     if b_leads:
         along = (qx - px) * (rx - px) + (qy - py) * (ry - py)
-        return along > 0.0 and find_turn(qx, qy, rx, ry, px, py) == 0
+        return along > 0.0 and find_orientation(qx, qy, rx, ry, px, py) == 0
     # others if each has the ends of the other on both sides
-    if find_turn(px, py, qx, qy, rx, ry) * find_turn(px, py, qx, qy, sx, sy) > 0:
+    if find_orientation(px, py, qx, qy, rx, ry) * find_orientation(px, py, qx, qy, sx, sy) > 0:
         return False
-    return find_turn(rx, ry, sx, sy, px, py) * find_turn(rx, ry, sx, sy, qx, qy) <= 0
+    return find_orientation(rx, ry, sx, sy, px, py) * find_orientation(rx, ry, sx, sy, qx, qy) <= 0
 
 
 @inlined
@@ -101,14 +101,15 @@ def find_half_planes(start_x, start_y, end_x, end_y):
 
 @kernel
 def fill_tree(line, leaves, boxes, half_planes, ends):
-    """Boxes (4, 2 leaves), half planes (2 leaves) and first, last edges (2, 2 leaves) of pieces.
+    """Boxes (4, 2 leaves) and half planes (2 leaves) of pieces; `ends` (2, 2 leaves): first edge,
+    one past the last.
 
-    Piece k has the parts 2k and 2k+1; leaves are the last `leaves`.  Returns the first edge without
-    length, or -1.
+    Piece k has the parts 2k and 2k+1; leaves are the last `leaves`, a power of two: those
+    beyond the line's edges are empty.  Returns the first edge without length, or -1.
     """
     x, y = line[0], line[1]
     count = line.shape[1] - 1
-    first_point = -1
+    first_empty_edge = -1
     # leaves: a few edges each
     for leaf in range(leaves):
         first = min(count, leaf * LEAF_EDGES)
@@ -122,8 +123,8 @@ def fill_tree(line, leaves, boxes, half_planes, ends):
             low_y, high_y = min(low_y, y[k], y[k + 1]), max(high_y, y[k], y[k + 1])
             edge_half_planes = find_half_planes(x[k], y[k], x[k + 1], y[k + 1])
             common &= edge_half_planes
-            if edge_half_planes == 0 and first_point < 0:
-                first_point = k
+            if edge_half_planes == 0 and first_empty_edge < 0:
+                first_empty_edge = k
         # kept as a leaf
         piece = leaves + leaf
         boxes[LOW_X, piece] = low_x
@@ -144,7 +145,7 @@ def fill_tree(line, leaves, boxes, half_planes, ends):
         half_planes[piece] = half_planes[first] & half_planes[second]
         ends[0, piece] = ends[0, first]
         ends[1, piece] = ends[1, second]
-    return first_point
+    return first_empty_edge
 
 
 @kernel
@@ -244,7 +245,7 @@ def search_meeting(nodes, line, boxes, half_planes, ends, stack):
     leaves = boxes.shape[1] // 2
     edge_without_length = fill_tree(line, leaves, boxes, half_planes, ends)
     if edge_without_length >= 0:
-        return COINCIDENT_EDGES, edge_without_length
+        return EDGE_WITHOUT_LENGTH, edge_without_length
     # pairs of pieces that may meet, from the whole boundary down
     depth = 1
     stack[0, 0] = 1
@@ -293,7 +294,7 @@ class BoundaryCheck:
     @staticmethod
     def is_clear(first_edge: int, nodes: np.ndarray, cuts: Cuts = ()) -> bool:
         """`is_simple`, where `search_meeting` has found `first_edge`."""
-        if first_edge == COINCIDENT_EDGES:
+        if first_edge == EDGE_WITHOUT_LENGTH:
             return False
         return first_edge == NO_CROSSING or find_crossing(nodes, cuts) is None
 

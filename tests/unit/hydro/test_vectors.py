@@ -14,7 +14,7 @@ from shockgrid.hydro.formulas.riemann import HLL_JUMP_THRESHOLDS
 from shockgrid.hydro.interior import axisymmetric, faces, reconstruction, scratch, slopes, update
 from shockgrid.regrid.algebraic import RowBlend
 from shockgrid.regrid.barrier import residual_estimate as check
-from shockgrid.regrid.barrier.functional import CellNumbers, CornerNumbers
+from shockgrid.regrid.barrier.functional import CellCoefficients, CornerCoefficients
 from shockgrid.regrid.compilation.first_calls import prepare_compiler
 
 CURVED = GEOMETRIES["axisymmetric"]
@@ -72,14 +72,16 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "radial lines": (lambda: axisymmetric.fill_lines, ()),
     "radial shifts": (lambda: axisymmetric.fill_shift_after, ()),
 }
-CORNER = CornerNumbers(1.0, 1.0, 1.0, 1.0)
-ROW_NUMBERS = check.RowNumbers(1.0, 1.0, 1.0, 1.0, CORNER, CellNumbers(1.0, 1.0), 1.0)
+CORNER = CornerCoefficients(1.0, 1.0, 1.0, 1.0)
+ROW_COEFFICIENTS = check.RowCoefficients(
+    1.0, 1.0, 1.0, 1.0, CORNER, CellCoefficients(1.0, 1.0), 1.0
+)
 CHECKS = {  # loops over a row of cells of the regridder's check: their arguments before the scratch
     "moved row": (check.move_row, (RowBlend(0.5, 0.1, *(((0.1, 0.1),) * 4), 0.1, 0.1), 16)),
     "old measures": (check.measure_old, (16,)),
     "lengths of edges": (check.load_edge_numbers, ((1.0,) * 5, (1.0,) * 3, 16)),
     "old areas": (check.fill_old_areas, (16,)),
-    "cells": (check.add_row_of_cells, (ROW_NUMBERS, 16)),
+    "cells": (check.add_row_of_cells, (ROW_COEFFICIENTS, 16)),
     "nodes": (check.add_row, (16,)),
 }
 HOISTED = {

@@ -194,3 +194,13 @@ def test_a_folded_face_is_named():
 def test_bad_options(options, word):
     with pytest.raises(BadInput, match=word.replace("(", r"\(")):
         BarrierRegridder3D(**options)
+
+
+@pytest.mark.parametrize("node", [(1, 1, 1), (2, 3, 3)])
+def test_a_node_that_is_no_number_is_no_valid_grid(node):
+    nodes = graded()
+    trial = nodes.copy()
+    trial[(0, *node)] = np.nan
+    least_ratio, least_volume = begin(nodes)._compare(trial, nodes)
+    assert not least_ratio > 0.0
+    assert not least_volume > 0.0

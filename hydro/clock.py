@@ -10,7 +10,7 @@ import numpy as np
 
 from shockgrid.regrid.compilation.first_calls import read_clock
 
-START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable step: the first steps of a run
+START_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the stable dt: the first steps of a run
 STEP_RECOVERY = 1.3  # growth of the step after it was cut
 MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over their distance
 
@@ -19,11 +19,11 @@ MOST_STRETCHING = 0.25  # relative displacement of neighbouring line nodes over 
 class Clock:
     """Time and step of a flow, and what limits the next step; all in seconds or per second.
 
-    t_end: end of the run; cfl: part of the stable step, the rate being summed over both grid
-    directions; rate: the largest rate of all cells but those that share their states, whose
-    inverse is the stable step; stretch_rate:
-    relative stretching of lines per time in the last step; retry_dt: bound on the step after one
-    was rejected, recovering; tension_dt: that of the shortest capillary waves.
+    t_end: end of the run; rate: the largest of all cells but those that share their states, summed
+    over both grid directions: its inverse is the time in which waves cross that cell; cfl: the part
+    of this time that is the stable dt; first_stable_dt: that at the start; stretch_rate: relative
+    stretching of lines per time in the last step; retry_dt: bound on the step after one was
+    rejected, recovering; tension_dt: that of the shortest capillary waves.
     """
 
     t_end: float
@@ -42,7 +42,8 @@ class Clock:
 
     def choose_dt(self) -> tuple[float, str]:
         """The next step and what limits it.  Theory F7.1."""
-        dt = self.cfl / self.rate
+        stable_dt = self.cfl / self.rate
+        dt = stable_dt
         dt_limit = "sound"
         if self.stretch_rate * dt > MOST_STRETCHING:
             dt = MOST_STRETCHING / self.stretch_rate
@@ -50,7 +51,7 @@ class Clock:
         if dt > self.tension_dt:
             dt = self.tension_dt
             dt_limit = "tension"
-        # the first steps are parts of the stable one, whatever limits that
+        # the first steps are parts of what is allowed, whatever limits that
         if self.step < len(START_FACTORS):
             dt = dt * START_FACTORS[self.step]
             dt_limit = "start"
@@ -68,7 +69,7 @@ class Clock:
         return dt, dt_limit
 
     def compute_fraction(self, dt: float) -> float:
-        """dt over the stable step."""
+        """dt over the stable dt."""
         return dt * self.rate / self.cfl
 
     def tick(self, dt: float, dt_limit: str, rate: float, stretching: float) -> bool:

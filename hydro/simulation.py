@@ -109,9 +109,9 @@ class Simulation:
 
     blocks with their segments put and joined; `links` of the joined segments; `mesh`: "regrid",
     "fixed" or a motion `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`:
-    part of the stable step, the rate being summed over both grid directions (1 is the limit of the
-    unsplit scheme); `source`: gravity or heating (`hydro.sources`); `geometry`:
-    "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
+    part of the time in which waves cross the fastest cell, their rate being summed over both grid
+    directions (1 is the limit of the unsplit scheme); `source`: gravity or heating
+    (`hydro.sources`); `geometry`: "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
     all integrals are then per radian);
     `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells stay as many as
     they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between

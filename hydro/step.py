@@ -123,13 +123,14 @@ class Touch:
 def take_step(flow: Flow) -> StepRecord:
     """Advance all blocks by one step.
 
-    Raises RunFailure if no step down to a few thousandths of the stable one is valid; the state is
-    then untouched.
+    Raises RunFailure if no step is valid, down to 2^-MOST_RETRIES of the one that was chosen; the
+    state is then untouched.
     """
     record = StepRecord()
     for block in flow.blocks:
         block.kernels.use_first_order(False)
-    # 1 dt from the largest rate of all blocks; halved for as long as the step fails
+    # 1 dt from the largest rate of all blocks; halved for as long as the step fails, but once at
+    # first order before, where that may help
     dt, record.dt_limit = flow.clock.choose_dt()
     first_dt = dt
     while outcome := try_step(flow, dt):
@@ -142,8 +143,8 @@ def take_step(flow: Flow) -> StepRecord:
         record.retries += 1
         if record.retries > MOST_RETRIES:
             raise outcome.tell(
-                f"{outcome}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); dt was cut "
-                f"{MOST_RETRIES} times to {dt:.3g} s without success",
+                f"{outcome}, t = {flow.clock.t:.6g} s (step {flow.clock.step}); "
+                f"{record.retries} steps were tried, the last of {dt:.3g} s",
                 RunFailure,
             )
         if lower_order(flow, outcome):
@@ -172,13 +173,13 @@ def lower_order(flow: Flow, reason: RunFailure) -> bool:
 
 def try_step(flow: Flow, dt: float) -> RunFailure | Touch | None:
     """Phases 2 to 6, into the new nodes and states; why the step does not stand, or None."""
-    fraction = flow.clock.compute_fraction(dt)  # of the stable step
+    fraction = flow.clock.compute_fraction(dt)  # of the stable dt
     flow.small_cells.set_time(flow.clock.t)
     try:
         with agree_on_failures(flow.motion, fraction):
             fill_states_beyond(flow, dt)
             find_contact_speeds(flow, dt)
-            touch = move_lines(flow, dt, fraction)
+            touch = move_boundaries(flow, dt, fraction)
         if touch is not None:
             return touch
         # 5 interiors regridded, convexity proved; the new nodes along all sides are shared
@@ -223,7 +224,7 @@ def find_contact_speeds(flow: Flow, dt: float) -> None:
             coupling.fill_speeds(flow.clock.t + 0.5 * dt, dt)
 
 
-def move_lines(flow: Flow, dt: float, fraction: float) -> Touch | None:
+def move_boundaries(flow: Flow, dt: float, fraction: float) -> Touch | None:
     """Phase 4; the shorter step, if surfaces come to touch within this one."""
     # 4 nodes along the sides moved; surfaces that have come to touch laid on each other.
     # History: motion of the sides and regridding are one column

@@ -77,7 +77,7 @@ def test_step_that_always_fails_leaves_the_state_and_names_the_place():
     simulation.advance()
     simulation.advance()
     before = get_bits(simulation)
-    with pytest.raises(RunFailure, match=r"block 'left'.*refused.*t = .*step 2.*dt was cut"):
+    with pytest.raises(RunFailure, match=r"block 'left'.*refused.*t = .*step 2.*steps were tried"):
         simulation.advance()
     assert get_bits(simulation) == before
 

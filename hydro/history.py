@@ -61,7 +61,7 @@ def count_regridding(flow: Flow) -> dict[str, float | int]:
 
 
 def count_special_cells(flow: Flow) -> dict[str, float | int]:
-    """Numbers of first-order faces, cells with voids, emptied cells, pulled pieces of contacts."""
+    """Numbers of first-order traces, cells with voids, emptied cells, pulled pieces of contacts."""
     first_order = 0
     voided = 0
     emptied = 0
@@ -71,7 +71,7 @@ def count_special_cells(flow: Flow) -> dict[str, float | int]:
             broken = (broken or 0) + block.stress.broken_cells
         sums = block.totals.sums
         first_order += int(sums.first_order)
-        if block.kernels.is_first_order:  # all of its faces
+        if block.kernels.is_first_order:  # all of its faces, each once
             first_order += 2 * block.ni * block.nj
         voided += int(sums.voided)
         emptied += int(sums.emptied)

@@ -26,7 +26,8 @@ MASS, MOMENTUM_X, MOMENTUM_Y, ENERGY, PUSH, HOOP = range(6)
 FLUX_ROWS = 6
 
 # columns of what a tile of cells adds up to: least c² (negative where there is
-# no sound speed), cells of first order, mass, momentum, energy, cells with voids, emptied cells
+# no sound speed), traces of first order (up to four a cell), mass, momentum, energy, cells with
+# voids, emptied cells
 (
     LEAST_C2,
     FIRST_ORDER,

@@ -25,10 +25,10 @@ from shockgrid.hydro.rows import (
 class Sums(NamedTuple):
     """Sums over the tiles of a block, in the order of the columns of `hydro.rows`.
 
-    least_c2: the least c² [m²/s²]; first_order: faces of first order; mass, momentum, energy: per
-    depth, in axisymmetric flow per radian [kg/m, N s/m, J/m; kg, N s, J]; voided: cells with voids;
-    emptied: cells of fragments that have given up almost all of their mass; first_mass: that of the
-    first material in a block of two.
+    least_c2: the least c² [m²/s²]; first_order: traces of first order, up to four a cell;
+    mass, momentum, energy: per depth, in axisymmetric flow per radian [kg/m, N s/m, J/m; kg, N s,
+    J]; voided: cells with voids; emptied: cells of fragments that have given up almost all of their
+    mass; first_mass: that of the first material in a block of two.
     """
 
     least_c2: float

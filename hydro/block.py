@@ -201,7 +201,7 @@ class Block:
         self.flux_name = flux
         self.kernels = BlockKernels(type(eos), limiter, flux, strength is not None)
         # which cells this process updates, and whether it holds all of them (`hydro.ranks`)
-        self.update_rows_only(0, self.ni)
+        self.set_own_rows(0, self.ni)
         self.is_here = True
         columns = MIXED_TOTAL_ROWS if self.mixed else TOTAL_ROWS
         self.totals = TileTotals(count_tiles(self.ni, self.nj), columns)
@@ -321,7 +321,7 @@ class Block:
         """Values (2, faces) of a field (2, ni, nj) in the cells along the perimeter."""
         return np.concatenate(get_sides(field), axis=1)
 
-    def update_rows_only(self, first: int, last: int) -> None:
+    def set_own_rows(self, first: int, last: int) -> None:
         """From now on update only the cell rows first..last - 1, which are whole rows of tiles."""
         self.rows = range(first, last)
         self.tiles = count_tiles(first, self.nj), count_tiles(last, self.nj)

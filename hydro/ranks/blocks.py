@@ -18,8 +18,9 @@ from shockgrid.hydro.ranks.cutting import CutBlock, Piece
 from shockgrid.hydro.workers import Workers
 from shockgrid.regrid.errors import RunFailure
 
-NODE_ROW = 11  # numbers of a block that go with its new nodes: quality, account of regridding
-STATE_ROW = 4  # and with its new states: the fastest cell
+# numbers of a block that go with its new nodes: quality, account of regridding
+NODE_REPORT_WIDTH = 11
+STATE_REPORT_WIDTH = 4  # and with its new states: the fastest cell
 
 Row = Sequence[float]
 Table = Sequence[Sequence[Any]]
@@ -85,7 +86,8 @@ class Blocks(list[Block]):
         return [(piece.number, row) for piece, row in zip(self.pieces, rows, strict=True)]
 
     def check_new_states(self, scan: Callable[[int], Row]) -> Table:
-        """The row of STATE_ROW numbers that `scan` finds of every block, before whether it stands.
+        """The row of STATE_REPORT_WIDTH numbers that `scan` finds of every block, before whether
+        it stands.
 
         Raises the RunFailure of the first block whose new state cannot stand.
         """
@@ -100,8 +102,8 @@ class Blocks(list[Block]):
         return self.exchange_new_states(rows, number, reason)
 
     def exchange_nodes(self, rows: Sequence[Row], number: int, failure: RunFailure | None) -> Table:
-        """The new nodes along the sides of all blocks, for everybody, and a row of NODE_ROW
-        numbers for every block, from those of one's own.
+        """The new nodes along the sides of all blocks, for everybody, and a row of
+        NODE_REPORT_WIDTH numbers for every block, from those of one's own.
 
         Raises the failure of the least number on all ranks, the same everywhere.
         """
@@ -111,7 +113,7 @@ class Blocks(list[Block]):
         self, rows: Sequence[Row], number: int, failure: RunFailure | None
     ) -> Table:
         """The new states along the sides and the sums of all blocks, for everybody, and rows of
-        STATE_ROW numbers; raises like `exchange_nodes`."""
+        STATE_REPORT_WIDTH numbers; raises like `exchange_nodes`."""
         return _give_or_raise(rows, failure)
 
     def exchange_states(self) -> None:

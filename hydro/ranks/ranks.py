@@ -29,7 +29,7 @@ import numpy as np
 from shockgrid.hydro import phases
 from shockgrid.hydro.block import Block
 from shockgrid.hydro.ranks import messages
-from shockgrid.hydro.ranks.blocks import NODE_ROW, STATE_ROW, Blocks, Row, Table
+from shockgrid.hydro.ranks.blocks import NODE_REPORT_WIDTH, STATE_REPORT_WIDTH, Blocks, Row, Table
 from shockgrid.hydro.ranks.cutting import (
     GHOST_ROWS,
     CutBlock,
@@ -112,7 +112,7 @@ class Ranks(Blocks):
                     group = self.book.count_group(group)
                     self.cuts[number] = CutBlock(group, self[number], self.bounds[number])
         for number, first, last in self.pieces:
-            self[number].update_rows_only(first, last)
+            self[number].set_own_rows(first, last)
 
     def _make_messages(self) -> None:
         blocks = self
@@ -122,7 +122,7 @@ class Ranks(Blocks):
         rings = [
             [(attrgetter("nodes_new"), messages.find_ring_of_nodes(block))] for block in blocks
         ]
-        self._nodes = self._make("nodes", rings, NODE_ROW)
+        self._nodes = self._make("nodes", rings, NODE_REPORT_WIDTH)
         # what cells along the sides hold, by bands of cut blocks; sums of the owners
         for number, block in enumerate(blocks):
             there = self.places[number]
@@ -139,7 +139,7 @@ class Ranks(Blocks):
                     ]
                     items.append(messages.Item(number, rank, parts))
             sums = [(_get_sums, np.arange(blocks[number].totals.array.size))]
-            new.append(messages.Item(number, there[0], sums, STATE_ROW))
+            new.append(messages.Item(number, there[0], sums, STATE_REPORT_WIDTH))
             now.append(messages.Item(number, there[0], sums))
         comm = self.book.count("states")
         self._new_states = messages.Message(comm, blocks, new)

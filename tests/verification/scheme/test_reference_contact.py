@@ -11,7 +11,7 @@ from shockgrid.hydro.motion.line import MOST_RESPACED_PART, move_parallel_to_nei
 from shockgrid.hydro.rim import CONTACT, FLUX, LENGTH, RHO, TRACE, C
 from shockgrid.hydro.rows import U, V
 from shockgrid.hydro.simulation import Simulation
-from shockgrid.hydro.step import fill_states_beyond, find_contact_speeds, move_lines
+from shockgrid.hydro.step import fill_states_beyond, find_contact_speeds, move_boundaries
 
 EXACT = 1e-12
 FRICTION = 0.3
@@ -100,7 +100,7 @@ def test_what_passes(contact):
 def test_nodes_between_their_faces(contact):
     """Inner nodes go with the speeds of the faces beside them, before they are spread or laid."""
     flow, pair = contact
-    move_lines(flow, DT, 1.0)
+    move_boundaries(flow, DT, 1.0)
     for side in (pair.leader, pair.follower):
         found = side.moving_line.moved[:, :: side.step][:, 1:-1]
         wanted = move_nodes(side.line, side.gather(CONTACT)[2:4], DT)

@@ -111,11 +111,11 @@ class Simulation:
     "fixed" or a motion `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`:
     part of the time in which waves cross the fastest cell, their rate being summed over both grid
     directions (1 is the limit of the unsplit scheme); `source`: gravity or heating
-    (`hydro.sources`); `geometry`: "plane", or "axisymmetric" with x along the axis and y the radius (`hydro.formulas.geometry`;
-    all integrals are then per radian);
-    `refining`: adds grid lines on the way (`hydro.remap.flow`), None: the cells stay as many as
-    they are; `void_fill`: pressure [Pa] and gamma of the gas that a void between
-    surfaces holds when it closes, None: nothing; `find_end`: called after every step, gives words
+    (`hydro.sources`); `geometry`: "plane", or "axisymmetric" with x along the axis and y the
+    radius (`hydro.formulas.geometry`; all integrals are then per radian); `refining`: adds grid
+    lines on the way (`hydro.remap.flow`), None: the cells stay as many as they are; `void_fill`:
+    pressure [Pa] and gamma of the gas that a void between surfaces holds when it closes, None:
+    nothing; `find_end`: called after every step, gives words
     for a run that has come to its end before `t_end`; `handover`: lays both blocks on one of two
     materials on the way (`hydro.remap.merging`).  Raises BadInput for sides that are not
     covered once by segments, and for blocks that lie on each other.

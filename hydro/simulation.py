@@ -111,14 +111,15 @@ class Simulation:
     "fixed" or a motion `(block name, t) -> nodes`; `make_regridder`: called once a block; `cfl`:
     part of the time in which waves cross the fastest cell, their rate being summed over both grid
     directions (1 is the limit of the unsplit scheme); `source`: gravity or heating
-    (`hydro.sources`); `geometry`: "plane", or "axisymmetric" with x along the axis and y the
-    radius (`hydro.formulas.geometry`; all integrals are then per radian); `refining`: adds grid
-    lines on the way (`hydro.remap.flow`), None: the cells stay as many as they are; `void_fill`:
-    pressure [Pa] and gamma of the gas that a void between surfaces holds when it closes, None:
-    nothing; `find_end`: called after every step, gives words
-    for a run that has come to its end before `t_end`; `handover`: lays both blocks on one of two
-    materials on the way (`hydro.remap.merging`).  Raises BadInput for sides that are not
-    covered once by segments, and for blocks that lie on each other.
+    (`hydro.sources`); `geometry`: "plane", or "axisymmetric" with x along the axis and y the radius
+    (`hydro.formulas.geometry`; all integrals are then per radian); `refining`: adds grid lines on
+    the way (`hydro.remap.flow`), None: the cells stay as many as they are; `void_fill`: pressure
+    [Pa] and gamma of the gas that a void between surfaces holds when it closes, None: nothing;
+    `find_end`: called after every step, gives words for a run that has come to its end before
+    `t_end`; `find_thin_place`: called with a block that lets the time step collapse, gives words
+    for a place where it is thin; `handover`: lays both blocks on one of two materials on the way
+    (`hydro.remap.merging`).  Raises BadInput for sides that are not covered once by segments, and
+    for blocks that lie on each other.
     """
 
     lists_in_state = (FACES_IN_STATE, VOIDS_IN_STATE)
@@ -140,6 +141,7 @@ class Simulation:
         refining: Refining | None = None,
         void_fill: tuple[float, float] | None = None,
         find_end: Callable[[Simulation], str | None] | None = None,
+        find_thin_place: Callable[[Block], str | None] | None = None,
         handover: Joining | None = None,
     ):
         self.geometry = find_geometry(geometry)
@@ -152,6 +154,7 @@ class Simulation:
         self._source = source
         self._void_fill = void_fill
         self._find_end = find_end
+        self._find_thin_place = find_thin_place
         self.handover = handover
         self.refining = refining
         self._counts_cells = refining is not None
@@ -462,6 +465,8 @@ class Simulation:
 
         It names the reason for which longer steps were rejected, or the cell with the largest rate.
         """
+        if self._find_thin_place is not None:
+            self._check_thin_place(self._find_thin_place)
         clock = self.clock
         dt, dt_limit = clock.choose_dt()
         can_hand_over = self.handover is not None and self.handover.first_nodes is None
@@ -486,7 +491,22 @@ class Simulation:
             place=Place(name, (fastest.i, fastest.j)),
         )
 
-    def find_collapsing_block(self) -> Block | None:
+    def _check_thin_place(self, find_thin_place: Callable[[Block], str | None]) -> None:
+        """Raise RunFailure where the step collapses in a block that is too thin to be followed."""
+        block = self._find_collapsing_block()
+        if block is None:
+            return
+        thin_place = find_thin_place(block)
+        if thin_place:
+            clock = self.clock
+            raise RunFailure(
+                f"flow: the time step collapses as {thin_place}; "
+                f"t = {clock.t:.6g} s (step {clock.step})",
+                cause="collapse",
+                place=Place(block.name),
+            )
+
+    def _find_collapsing_block(self) -> Block | None:
         """The block whose grid lets no step happen that gets the run anywhere, if there is one."""
         clock = self.clock
         possible = min(clock.retry_dt, clock.cfl / clock.rate)

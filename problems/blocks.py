@@ -451,7 +451,8 @@ class Blocks(Problem):
             mesh=deck.mesh,
             geometry=deck.geometry,
             source=make_gravity(*deck.gravity) if any(deck.gravity) else None,
-            find_end=lambda flow: necks and necks.find_cut(flow.find_collapsing_block()),
+            find_end=lambda flow: necks and necks.find_cut(),
+            find_thin_place=lambda block: necks and necks.find_thin_place(block),
         )
         necks = Necks(flow.meetings.bodies) if flow.meetings.pairs else None
         return flow

@@ -21,7 +21,7 @@ from shockgrid.hydro.facets.lines import compute_normal, measure_square, project
 from shockgrid.regrid.jit import compiled_once, kernel
 
 THINNEST_CELL_PART = 0.05  # of the mean size of a block's cells at first: thinner necks are cut
-THINNEST_FOLLOWED_PART = 0.15  # the same where the time step collapses in this block
+THIN_PART = 0.15  # the same: where the time step collapses, thinner places are named as its cause
 TIP_CELLS = 1.0  # cells: if less lies beyond a thin place, it is a tip, and no body is in two parts
 # of the width of the thinnest place at first, where a deck's own body is about as thin
 THINNEST_FIRST_PART = 0.1
@@ -184,11 +184,8 @@ class Necks:
             inner[:, [0, -1]] = inner[:, [1, -2]]  # at corners the node inwards of both sides
             self.inner[:, span] = inner
 
-    def find_cut(self, collapsing: Block | None = None) -> str | None:
-        """A sentence about the place where a body is cut now, or a corner is a film; or None.
-
-        collapsing: the block of which the grid lets the time step collapse, if it does.
-        """
+    def find_cut(self) -> str | None:
+        """A sentence about the place where a body is cut now, or a corner is a film; or None."""
         outlines = self.bodies.outlines
         if self._least_part is None:
             outlines.nodes[...] = self._first_nodes
@@ -198,22 +195,26 @@ class Necks:
         node, opposite, part = find_thinnest.entry(
             outlines, self.inner, self.sizes, self._least_part
         )
-        beyond = ""
-        if node == NO_FACE and collapsing is not None:
-            sizes = np.where(self._find_nodes(collapsing), self.sizes, 0.0)
-            node, opposite, part = find_thinnest.entry(
-                outlines, self.inner, sizes, THINNEST_FOLLOWED_PART
-            )
-            beyond = ", which no grid follows further"
         if node == NO_FACE:
             return None
-        surface = self.bodies.find_surface(int(node))
-        x, y = outlines.nodes[:, node]
         is_tip = measure_beyond.entry(outlines, node, opposite) < TIP_CELLS * self.sizes[node] ** 2
         event = "a corner is drawn out to a film" if is_tip else "a body is cut"
+        return f"{event}: {self._describe(node, part)}"
+
+    def find_thin_place(self, block: Block) -> str | None:
+        """A sentence about the place where a block is thinner than THIN_PART of a cell; or None."""
+        self._read()
+        sizes = np.where(self._find_nodes(block), self.sizes, 0.0)
+        node, _, part = find_thinnest.entry(self.bodies.outlines, self.inner, sizes, THIN_PART)
+        return None if node == NO_FACE else self._describe(node, part)
+
+    def _describe(self, node: int, part: float) -> str:
+        """Where a body is thin at a node: `part` of a cell."""
+        x, y = self.bodies.outlines.nodes[:, node]
         return (
-            f"{event}: {surface} has come within {part * self.sizes[node]:.3g} m, {part:.2g} of a "
-            f"cell, of another surface of the same body at x = {x:.6g} m, y = {y:.6g} m{beyond}"
+            f"{self.bodies.find_surface(int(node))} has come within "
+            f"{part * self.sizes[node]:.3g} m, {part:.2g} of a cell, of another surface of the "
+            f"same body at x = {x:.6g} m, y = {y:.6g} m"
         )
 
     def _find_nodes(self, block: Block) -> np.ndarray:

@@ -125,6 +125,17 @@ def test_a_neck_is_cut_below_a_part_of_a_cell(width):
     assert cut is None or ("a body is cut" in cut and "body0" in cut and "x = 0.5" in cut)
 
 
+def test_a_thin_place_is_no_cut_but_told_where_the_time_step_collapses():
+    body, other = make_boxes((0.0, 0.0), (9.0, 9.0))
+    simulation = Simulation([body, other], [], t_end=1.0)
+    necks = Necks(simulation.meetings.bodies)
+    neck = 2.0 * THINNEST_CELL_PART * 0.1
+    body.nodes[1, 5] = 0.5 + neck * np.linspace(-0.5, 0.5, 11)
+    assert necks.find_cut() is None
+    assert "0.1 of a cell" in necks.find_thin_place(body)
+    assert necks.find_thin_place(other) is None
+
+
 @pytest.mark.parametrize("taper", [0.0, 0.5])
 @pytest.mark.parametrize("gap", [1e-3, 1e-9, -1e-9])
 def test_ends_of_a_body_that_touch_are_no_neck(gap, taper):

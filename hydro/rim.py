@@ -32,7 +32,7 @@ RHO_FACE, U_FACE, V_FACE, P_FACE, C_FACE = _rows(5)
 U_NEXT, V_NEXT, DISTANCE_NEXT = _rows(3)
 # the ghosts beyond the faces
 RHO_GHOST, U_GHOST, V_GHOST, P_GHOST, LENGTH_GHOST = _rows(5)
-# the cells at mid-time: state, gradients, centre; c² and energy if torn (else WHOLE_CELL_MARK) at
+# the cells at mid-time: state, gradients, centre; c² and energy if failed (else WHOLE_CELL_MARK) at
 # the old time, HLL switch, acoustic weight
 RHO_HALF, U_HALF, V_HALF, P_HALF = _rows(4)
 RHO_X, RHO_Y, U_X, U_Y, V_X, V_Y, P_X, P_Y = _rows(8)

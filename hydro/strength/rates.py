@@ -424,8 +424,8 @@ def update_stress(values, rates, laws, shear, held, dt, rows):
     """New stress and plastic strain after what the mass has brought, in place.
 
     values (n, ni + 2, nj + 2): carried fields of a solid from s_xx on; laws: flow stress and
-    hardening (ni, nj) [Pa]; shear (ni, nj) [Pa]; held: arrays of HELD_ARRAYS after the step: torn
-    cells bear nothing.
+    hardening (ni, nj) [Pa]; shear (ni, nj) [Pa]; held: arrays of HELD_ARRAYS after the step:
+    failed cells bear nothing.
     """
     flow_stress, hardening = laws
     nj = shear.shape[1]

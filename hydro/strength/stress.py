@@ -129,8 +129,8 @@ class Stress:
         held = block.list_starts()
         self._states_at_start = self._list_state(block, held)
         shear = self._find_shear(self._states_at_start, block.get_start("carried"))
-        torn = has_voids(held, slice(None), slice(None))
-        self.arrays.shear[...] = np.where(torn, 0.0, shear)
+        failed = has_voids(held, slice(None), slice(None))
+        self.arrays.shear[...] = np.where(failed, 0.0, shear)
         rho = held[0][RHO, 1:-1, 1:-1]
         with np.errstate(all="ignore"):
             self.arrays.shear_wave[...] = add_shear_wave(0.0, self.arrays.shear, rho)

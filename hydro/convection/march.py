@@ -114,9 +114,12 @@ class March:
         self.t = t
         self.dt = 0.0
         self.step = 0
-        self.limit = "longest"
+        self.dt_limit = "longest"
+        # of the matrices: what they were made for, and what is made with them
         self._key: tuple | None = None
+        self._held: Equations | None = None
         self._factors: tuple[Factors, Factors] | None = None
+        self._buoyancy: sparse.csr_matrix | None = None
 
     @property
     def equations(self) -> Equations:
@@ -144,17 +147,17 @@ class March:
 
     def choose_step(self, remaining: float = math.inf) -> float:
         """dt [s] of the next step: the last one if it is still allowed, at most `remaining`."""
-        longest, limit = self.compute_longest_step()
+        longest, dt_limit = self.compute_longest_step()
         if not math.isfinite(longest):
             raise BadInput(
                 "convection: the fluid is at rest and no longest step is given; give one"
             )
         dt = self.dt
         if not self.dt or dt > longest or longest > BOX_STEP_GROWTH * dt:
-            dt = longest if limit == "longest" else longest / math.sqrt(BOX_STEP_GROWTH)
-            self.limit = limit
+            dt = longest if dt_limit == "longest" else longest / math.sqrt(BOX_STEP_GROWTH)
+            self.dt_limit = dt_limit
         if dt >= remaining * (1.0 - 1e-12):
-            self.limit = "end"
+            self.dt_limit = "end"
             return remaining
         return 0.5 * remaining if 2.0 * dt > remaining else dt
 
@@ -167,27 +170,27 @@ class March:
         before = self.before
         new = old.equations if axes is None else Equations(*axes, old.equations.walls)
         ratio = dt / self.dt if before is not None else 0.0
-        first = (1.0 + 2.0 * ratio) / (1.0 + ratio)
-        third = ratio * ratio / (1.0 + ratio)
-        second = -(first + third)
+        a0 = (1.0 + 2.0 * ratio) / (1.0 + ratio)
+        a2 = ratio * ratio / (1.0 + ratio)
+        a1 = -(a0 + a2)
 
         def extrapolate(name: str) -> np.ndarray:
             value = getattr(old, name)
             return value if before is None else value + ratio * (value - getattr(before, name))
 
         def past(name: str) -> np.ndarray:
-            value = second * getattr(old, name)
-            return value if before is None else value + third * getattr(before, name)
+            value = a1 * getattr(old, name)
+            return value if before is None else value + a2 * getattr(before, name)
 
         # W (a0 swept - a2 swept before) is the backward difference of the areas
         relative = new.momentum.curl @ extrapolate("psi")
         if new is not old.equations:
-            relative -= first / dt * compute_swept(old.equations, new)
+            relative -= a0 / dt * compute_swept(old.equations, new)
         if before is not None and before.equations is not old.equations:
-            relative += third / dt * compute_swept(before.equations, old.equations)
+            relative += a2 / dt * compute_swept(before.equations, old.equations)
         t = self.t + dt
         force, heat = (0.0, 0.0) if self.sources is None else self.sources(new, t)
-        conduction, friction = self._factorise(new, first / dt)
+        conduction, friction = self._factorise(new, a0 / dt)
 
         carried = relative * (new.heat.values @ extrapolate("temperature"))
         wall_heat = self.fluid.diffusivity * new.wall_gradient + new.wall_flux
@@ -198,7 +201,7 @@ class March:
         velocity = momentum.carry @ extrapolate("velocity")
         right = momentum.sum_around(force - past("momentum") / dt)
         right -= momentum.sum_carried((new.topology.spread @ relative) * velocity)
-        right += self.buoyancy @ temperature
+        right += self._buoyancy @ temperature
         psi = friction.solve(right)
         if not (np.isfinite(psi).all() and np.isfinite(temperature).all()):
             raise RunFailure(
@@ -206,7 +209,7 @@ class March:
                 cause="not-finite",
             )
         entering = heat + new.heat.balance @ new.compute_conduction(self.fluid, temperature)
-        entered = (dt * float(entering.sum()) - past("entered")) / first
+        entered = (dt * float(entering.sum()) - past("entered")) / a0
         self.before = old
         self.level = Level(new, psi, temperature, entered)
         self.t = t
@@ -218,7 +221,7 @@ class March:
         key = (id(new), rate)
         if self._key != key:
             fluid = self.fluid
-            self.buoyancy = new.buoyancy(fluid)
+            self._buoyancy = new.buoyancy(fluid)
             heat = rate * sparse.diags(new.areas) - fluid.diffusivity * new.heat.conduction
             flow = rate * new.momentum.mass - fluid.viscosity * new.momentum.friction
             self._factors = Factors(heat, "matrix of the heat"), Factors(flow, "matrix of the flow")
@@ -227,8 +230,8 @@ class March:
         return self._factors
 
     def get_state(self) -> dict[str, np.ndarray | float | int | str]:
-        """All that the next step depends on."""
-        state = {"t": self.t, "dt": self.dt, "step": self.step, "limit": self.limit}
+        """All that the next step depends on; the current level twice where there is none before."""
+        state = {"t": self.t, "dt": self.dt, "step": self.step, "limit": self.dt_limit}
         state["levels"] = 1 if self.before is None else 2
         for name, level in (("now", self.level), ("before", self.before or self.level)):
             x, y = (axis.nodes for axis in level.equations.axes)
@@ -258,5 +261,5 @@ class March:
         self.t = float(state["t"])
         self.dt = float(state["dt"])
         self.step = int(state["step"])
-        self.limit = str(state["limit"])
+        self.dt_limit = str(state["limit"])
         self._key = None

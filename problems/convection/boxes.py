@@ -174,7 +174,7 @@ class TimeEvolution(_Box):
         march.advance(dt, axes)
         if dt == remaining:
             march.t = self.t_end
-        row = {"t": self.t, "dt": dt, "dt_limit": march.limit, **self.start_row()}
+        row = {"t": self.t, "dt": dt, "dt_limit": march.dt_limit, **self.start_row()}
         mass = measure_mass(self.equations, self.psi)
         return {**row, "mass_residual": mass, "grid_shift": shift}
 

@@ -64,7 +64,7 @@ class EquationOfState:
     - `strength_left_part(rho, parameters)`, optional: the fraction of that tension that fragments
       with gaps between them can bear (`hydro.eos.base`); by default all of it
     - `least_density_part(parameters)`, optional: the density [kg/m³] down to which fragments leave
-      a cell (`make_leaving_part`); by default they all do
+      a cell (`make_leaving_fraction`); by default they all do
     - `opens_voids`: False if there is no such pressure; the flow kernels then omit voids
     - `gruneisen_part(rho, parameters)`, optional: (dp/de)/rho, of a material whose pressure is
       linear in the energy; such materials can share cells (`hydro.eos.mixture`)
@@ -261,7 +261,7 @@ def make_least_pressure(eos_class):
     return keep if strength_left_part is None else weaken
 
 
-def make_leaving_part(eos_class):
+def make_leaving_fraction(eos_class):
     """`part(rho, parameters)` of a class: the fraction of its flux with which material of a density
     leaves a cell, or None without `least_density_part`.
 
@@ -275,12 +275,12 @@ def make_leaving_part(eos_class):
         return None
 
     @inlined
-    def find_leaving_part(rho, parameters):
+    def find_leaving_fraction(rho, parameters):
         excess = rho * (1.0 / least_density_part(parameters)) - 1.0
-        leaving_part = choose(excess < 1.0, excess, 1.0 + 0.0 * rho)
-        return choose(leaving_part > 0.0, leaving_part, 0.0 * rho)
+        leaving_fraction = choose(excess < 1.0, excess, 1.0 + 0.0 * rho)
+        return choose(leaving_fraction > 0.0, leaving_fraction, 0.0 * rho)
 
-    return find_leaving_part
+    return find_leaving_fraction
 
 
 def measure_inverse(eos: EquationOfState, rho: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -19,6 +19,11 @@ IDEAL_GAS_ERROR = 1e-9  # of the pressure, from rho c²/gamma
 # difference of the pressures on both sides of a contact, over their sum, above which Newton's
 # method has not settled; steps of bisection that go down to round-off
 UNSETTLED_PRESSURES = 1e-9
+# Newton's method for a contact: change of its speed, over the sound speed, at which it has settled
+SETTLED_SPEED_CHANGE = 1e-14
+MOST_NEWTON_STEPS = 20
+LEAST_SLOPE_PART = 1e-3  # of rho c: slope of the pressure behind a release
+LEAST_FALL_RATE = 1e-300  # of (rho c)² over the pressure: nothing is divided by 0
 MOST_BISECTIONS = 60
 
 
@@ -68,23 +73,23 @@ def compute_contact_speed(left, right, square):
     rho_r, p_r, w_r, s_r = right
     flow_l = rho_l * (s_l - w_l)
     flow_r = rho_r * (s_r - w_r)
-    push = square * (p_r - p_l) + (flow_l * w_l - flow_r * w_r)
-    return push, flow_l - flow_r, flow_l, flow_r
+    s_star_numerator = square * (p_r - p_l) + (flow_l * w_l - flow_r * w_r)
+    return s_star_numerator, flow_l - flow_r, flow_l, flow_r
 
 
 @inlined
 def compute_star_flux(side, wave, face):
-    """HLLC flux from the upwind side of the contact, whose speed is s* = push / drag, and the
-    pressure in it.
+    """HLLC flux from the upwind side of the contact, and the pressure in it.
 
-    side: (rho, u, v, p, e); wave: (w, flow, s, s_cut, push, drag, square): speed and mass flow of
-    this side, its outer wave, that wave's speed or 0 where it runs away from the face, numbers of
-    the contact; face: (area_x, area_y, sweep).  All speeds times the length.
+    side: (rho, u, v, p, e); wave: (w, flow, s, s_cut, s_star_numerator, s_star_denominator,
+    square): speed and mass flow of this side, its outer wave, that wave's speed or 0 where it runs
+    away from the face, the contact's speed s* as a fraction; face: (area_x, area_y, sweep).  All
+    speeds times the length.
     """
     rho, u, v, p, e = side
-    w, flow, s_side, s_cut, push, drag, square = wave
+    w, flow, s_side, s_cut, s_star_numerator, s_star_denominator, square = wave
     area_x, area_y, sweep = face
-    s_star = push / drag
+    s_star = s_star_numerator / s_star_denominator
     gap = s_side - s_star
     inverse = 1.0 / (gap * square)
     thinning = inverse * square
@@ -120,15 +125,15 @@ def compute_hllc_flux(left, right, face, acoustic_weight):
     w_l, w_r = compute_normal_speeds(u_l, v_l, u_r, v_r, area_x, area_y, sweep)
     w_l, w_r = reduce_jump(w_l, w_r, acoustic_weight)
     s_l, s_r = compute_waves(w_l, c2_l, w_r, c2_r, square)
-    push, drag, flow_l, flow_r = compute_contact_speed(
+    s_star_numerator, s_star_denominator, flow_l, flow_r = compute_contact_speed(
         (rho_l, p_l, w_l, s_l), (rho_r, p_r, w_r, s_r), square
     )
-    if push <= 0.0:
+    if s_star_numerator <= 0.0:
         s_cut = s_l if s_l < 0.0 else 0.0
-        wave = w_l, flow_l, s_l, s_cut, push, drag, square
+        wave = w_l, flow_l, s_l, s_cut, s_star_numerator, s_star_denominator, square
         return compute_star_flux((rho_l, u_l, v_l, p_l, e_l), wave, face)
     s_cut = s_r if s_r > 0.0 else 0.0
-    wave = w_r, flow_r, s_r, s_cut, push, drag, square
+    wave = w_r, flow_r, s_r, s_cut, s_star_numerator, s_star_denominator, square
     return compute_star_flux((rho_r, u_r, v_r, p_r, e_r), wave, face)
 
 
@@ -173,15 +178,15 @@ def compute_hll_flux(left, right, face):
 
 
 @inlined
-def withhold(flux, side, leaving_part):
+def withhold(flux, side, leaving_fraction):
     """A flux of which only a part of the mass leaves the cell that it comes from.
 
-    flux: (mass, momentum x, momentum y, energy, pressure); side: (u, v, e) there; leaving_part: of
-    `hydro.eos.base.make_leaving_part`.  The pressure acts as it does.
+    flux: (mass, momentum x, momentum y, energy, pressure); side: (u, v, e) there;
+    leaving_fraction: of `hydro.eos.base.make_leaving_fraction`.  The pressure acts as it does.
     """
     mass, momentum_x, momentum_y, energy, pressure = flux
     u, v, e = side
-    kept_mass = (1.0 - leaving_part) * mass
+    kept_mass = (1.0 - leaving_fraction) * mass
     return (
         mass - kept_mass,
         momentum_x - kept_mass * u,
@@ -202,8 +207,8 @@ def compute_wave_pressure(rho, p, c, wave_law, du):
     is at p = 0 with nearly its first density, where that gas would still press.  Its (rho c)²
     falls with the pressure almost linearly (exactly, for a Mie-Grueneisen solid lighter than
     rho0) to z² at p = 0, and then p* = p + rho c du + k du²/4 with k the slope of (rho c)².
-    The slope is kept above 1e-3 rho c, so that Newton steps stay finite where material would break.
-    Theory F4.2, F4.3, F4.4.
+    The slope is kept above LEAST_SLOPE_PART rho c, so that Newton steps stay finite where material
+    would break.  Theory F4.2, F4.3, F4.4.
     """
     slope_a, slope_b, z = wave_law
     impedance = rho * c
@@ -218,8 +223,8 @@ def compute_wave_pressure(rho, p, c, wave_law, du):
         fall_rate = impedance * impedance - z * z
         steepest_fall = 4.0 * slope_a * rho  # that of weak waves, as in the shock's law
         fall_rate = fall_rate / p if abs(fall_rate) < steepest_fall * abs(p) else steepest_fall
-        fall_rate = fall_rate if fall_rate > 1e-300 else 1e-300
-        least_slope = 1e-3 * impedance
+        fall_rate = fall_rate if fall_rate > LEAST_FALL_RATE else LEAST_FALL_RATE
+        least_slope = LEAST_SLOPE_PART * impedance
         slope_floor_du = (least_slope - impedance) / (
             0.5 * fall_rate
         )  # where the slope has come down to the least
@@ -237,7 +242,7 @@ def compute_wave_pressure(rho, p, c, wave_law, du):
         sound_speed_ratio = sound_speed_ratio if sound_speed_ratio > 0.0 else 0.0
         power = sound_speed_ratio ** ((gamma + 1.0) / (gamma - 1.0))
         pressure = p + impedance * c / gamma * (power * sound_speed_ratio - 1.0)
-        power = power if power > 1e-3 else 1e-3
+        power = power if power > LEAST_SLOPE_PART else LEAST_SLOPE_PART
         slope = impedance * power
     return pressure, slope
 
@@ -311,13 +316,14 @@ def compute_contact(left, right, jump):
     """
     rho_l, w_l, p_l, c_l, law_l = left
     rho_r, w_r, p_r, c_r, law_r = right
-    z_l = rho_l * c_l
-    z_r = rho_r * c_r
-    w_star = ((z_l * w_l + z_r * w_r) + ((p_l - p_r) - jump)) / (z_l + z_r)
-    small = 1e-14 * (c_l + c_r)
+    impedance_l = rho_l * c_l
+    impedance_r = rho_r * c_r
+    momentum = impedance_l * w_l + impedance_r * w_r
+    w_star = (momentum + ((p_l - p_r) - jump)) / (impedance_l + impedance_r)
+    small = SETTLED_SPEED_CHANGE * (c_l + c_r)
     pressure_l = p_l
     pressure_r = p_r
-    for _ in range(20):
+    for _ in range(MOST_NEWTON_STEPS):
         pressure_l, slope_l = compute_wave_pressure(rho_l, p_l, c_l, law_l, w_l - w_star)
         pressure_r, slope_r = compute_wave_pressure(rho_r, p_r, c_r, law_r, w_star - w_r)
         change = ((pressure_l - pressure_r) - jump) / (slope_l + slope_r)
@@ -339,10 +345,10 @@ def compute_speed_at_pressure(rho, w, p, c, wave_law, p_star):
     `w`: velocity along the outward normal.  Newton steps from the acoustic solution.
     """
     w_star = w + (p - p_star) / (rho * c)
-    for _ in range(20):
+    for _ in range(MOST_NEWTON_STEPS):
         pressure, slope = compute_wave_pressure(rho, p, c, wave_law, w - w_star)
         change = (pressure - p_star) / slope
         w_star = w_star + change
-        if abs(change) <= 1e-14 * c:
+        if abs(change) <= SETTLED_SPEED_CHANGE * c:
             break
     return w_star

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.eos.base import make_leaving_fraction
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.formulas.reconstruction import DEFAULT_LIMITER, LOW_MACH
 from shockgrid.hydro.formulas.riemann import DEFAULT_FLUX
@@ -184,26 +184,29 @@ def make_flow_kernels(
     )
     fill_faces_i = make_faces(geometry.face, scratch.X_HIGH, scratch.X_HIGH + 1, scratch.AREA_X_I)
     fill_faces_j = make_faces(geometry.face, scratch.X_HIGH, scratch.X_LOW, scratch.AREA_X_J)
-    gather_flux = make_update(eos_class, geometry, False, True, is_solid)
-    update_rows = make_update(eos_class, geometry, True, True, is_solid)
-    fill_new_state = make_update(eos_class, geometry, True, False, is_solid)
+    kind = eos_class, geometry, is_solid
+    open_account = make_update(*kind, closes_before=False, opens_own=True)
+    close_and_open = make_update(*kind, closes_before=True, opens_own=True)
+    close_account = make_update(*kind, closes_before=True, opens_own=False)
     fill_traces_in, fill_traces = make_traces(sound, opens_voids, is_solid)
-    pressure_i, pressure_j = (scratch.PRESSURE_I, scratch.PRESSURE_J) if curved else (0, 0)
+    pressure_i = scratch.PRESSURE_I if curved else scratch.NO_ROW
+    pressure_j = scratch.PRESSURE_J if curved else scratch.NO_ROW
     i_faces = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
     j_faces = scratch.RHO_UP + CELL_BELOW, scratch.RHO_DOWN, scratch.AREA_X_J
-    force_i, force_j = (scratch.STRESS_I, scratch.STRESS_J) if is_solid else (0, 0)
+    stress_i = scratch.STRESS_I if is_solid else scratch.NO_ROW
+    stress_j = scratch.STRESS_J if is_solid else scratch.NO_ROW
     choice = low_mach, opens_voids
     fill_upwind_i = make_upwind(
-        *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, *choice, force_i
+        *i_faces, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE, *choice, stress_i
     )
     fill_upwind_j = make_upwind(
         *j_faces,
         scratch.VOIDED_ENERGY + CELL_BELOW,
         scratch.ACOUSTIC + CELL_BELOW,
         *choice,
-        force_j,
+        stress_j,
     )
-    voids = opens_voids, make_leaving_part(eos_class)
+    voids = opens_voids, make_leaving_fraction(eos_class)
     fill_flux_i = make_flux(
         energy, scratch.AREA_X_I, scratch.FLUX_I_MASS, pressure_i, *voids, is_solid
     )
@@ -217,7 +220,7 @@ def make_flow_kernels(
         scratch.FLUX_I_MASS,
         pressure_i,
         *voids,
-        force_i,
+        stress_i,
     )
     use_hll_j = make_hll_flux(
         energy,
@@ -226,7 +229,7 @@ def make_flow_kernels(
         scratch.FLUX_J_MASS,
         pressure_j,
         *voids,
-        force_j,
+        stress_j,
     )
     # solids alone
     add_shear_flux_i = make_shear_flux(
@@ -444,11 +447,11 @@ def make_flow_kernels(
                     copy_back(Z, scratch.FLUX_J_MASS + entry, count + 1, mass_j, row, first_j)
             # new state of the row before, whose fluxes are complete; this row's first ones are kept
             if is_own and row > tile.first_row:
-                update_rows(Z, whole, dt, inverse_dt, parameters)
+                close_and_open(Z, whole, dt, inverse_dt, parameters)
             elif is_own:
-                gather_flux(Z, whole, dt, inverse_dt, parameters)
+                open_account(Z, whole, dt, inverse_dt, parameters)
             elif row > tile.first_row:
-                fill_new_state(Z, whole, dt, inverse_dt, parameters)
+                close_account(Z, whole, dt, inverse_dt, parameters)
             if row > tile.first_row:
                 for q in range(STATE_ROWS):
                     source = scratch.RHO_NEW + q * SCRATCH_SPAN + entry

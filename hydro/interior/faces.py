@@ -152,7 +152,14 @@ def make_traces(sound_speed_squared_part, opens_voids, is_solid=False):
 
 
 def make_upwind(
-    left_row, right_row, face_row, voided_row, acoustic_row, low_mach, opens_voids, stress_row=0
+    left_row,
+    right_row,
+    face_row,
+    voided_row,
+    acoustic_row,
+    low_mach,
+    opens_voids,
+    stress_row=scratch.NO_ROW,
 ):
     """Make the kernel that chooses the upwind side of the contact at faces: first half of HLLC.
 
@@ -161,6 +168,8 @@ def make_upwind(
     limiter has acoustic weights; `opens_voids`: the material has void energies; `stress_row`: of a
     solid, the first row of its stress on the faces.
     """
+
+    is_solid = stress_row != scratch.NO_ROW
 
     @compiled_once(allocates=False)
     def fill_upwind(Z, n):
@@ -195,14 +204,14 @@ def make_upwind(
             )
             left_stress = 0.0
             right_stress = 0.0
-            if stress_row:
+            if is_solid:
                 left_stress = Z[stress_row + k]
                 right_stress = Z[stress_row + scratch.TO_NORMAL_RIGHT + k]
-            push, drag, flow_l, flow_r = riemann.compute_contact_speed(
+            s_star_numerator, s_star_denominator, flow_l, flow_r = riemann.compute_contact_speed(
                 (rho_l, p_l - left_stress, w_l, s_l), (rho_r, p_r - right_stress, w_r, s_r), square
             )
-            from_left = push <= 0.0
-            if stress_row:
+            from_left = s_star_numerator <= 0.0
+            if is_solid:
                 Z[scratch.STRESS_SIDE + k] = left_stress if from_left else right_stress
             s_l_cut = s_l if s_l < 0.0 else 0.0
             s_r_cut = s_r if s_r > 0.0 else 0.0
@@ -221,8 +230,8 @@ def make_upwind(
             Z[scratch.FLOW_SIDE + k] = flow_l if from_left else flow_r
             Z[scratch.S_SIDE + k] = s_l if from_left else s_r
             Z[scratch.S_CUT + k] = s_l_cut if from_left else s_r_cut
-            Z[scratch.PUSH + k] = push
-            Z[scratch.DRAG + k] = drag
+            Z[scratch.S_STAR_NUMERATOR + k] = s_star_numerator
+            Z[scratch.S_STAR_DENOMINATOR + k] = s_star_denominator
             Z[scratch.SQUARE + k] = square
 
     return fill_upwind
@@ -252,17 +261,18 @@ def make_flux(
     flux_row,
     pressure_row,
     opens_voids,
-    find_leaving_part=None,
+    find_leaving_fraction=None,
     is_solid=False,
 ):
     """Make the kernel that turns the upwind sides of faces into fluxes: second half of HLLC.
 
     Scratch offsets: `face_row`: the faces' normals; `flux_row`: mass flux (momentum, energy
-    follow); `pressure_row`: where the pressure in them is kept, 0: nowhere.  `find_leaving_part`:
-    of `hydro.eos.base.make_leaving_part`, where emptied cells keep what they have; `is_solid`: the
-    stress acts as a part of the pressure.
+    follow); `pressure_row`: where the pressure in them is kept, or NO_ROW.
+    `find_leaving_fraction`: of `hydro.eos.base.make_leaving_fraction`, where emptied cells keep
+    what they have; `is_solid`: the stress acts as a part of the pressure.
     """
-    withholds = find_leaving_part is not None
+    withholds = find_leaving_fraction is not None
+    keeps_pressure = pressure_row != scratch.NO_ROW
 
     @compiled_once(allocates=False)
     def fill_flux(Z, n, parameters):
@@ -281,8 +291,8 @@ def make_flux(
                 Z[scratch.FLOW_SIDE + k],
                 Z[scratch.S_SIDE + k],
                 Z[scratch.S_CUT + k],
-                Z[scratch.PUSH + k],
-                Z[scratch.DRAG + k],
+                Z[scratch.S_STAR_NUMERATOR + k],
+                Z[scratch.S_STAR_DENOMINATOR + k],
                 Z[scratch.SQUARE + k],
             )
             u = Z[scratch.U_SIDE + k]
@@ -300,14 +310,14 @@ def make_flux(
                 ),
             )
             if withholds:
-                flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
+                flux = riemann.withhold(flux, (u, v, e), find_leaving_fraction(rho, parameters))
             # kept for the update
             mass, momentum_x, momentum_y, energy, pressure = flux
             Z[flux_row + k] = mass
             Z[flux_row + scratch.TO_MOMENTUM_X + k] = momentum_x
             Z[flux_row + scratch.TO_MOMENTUM_Y + k] = momentum_y
             Z[flux_row + scratch.TO_ENERGY + k] = energy
-            if pressure_row:
+            if keeps_pressure:
                 Z[pressure_row + k] = pressure
 
     return fill_flux
@@ -316,30 +326,34 @@ def make_flux(
 def make_hll_flux(
     energy_part,
     faces,
-    marks,
+    left_cells,
     flux_row,
     pressure_row,
     opens_voids,
-    find_leaving_part=None,
-    stress_row=0,
+    find_leaving_fraction=None,
+    stress_row=scratch.NO_ROW,
 ):
     """Make the kernel that replaces HLLC fluxes by HLL ones at faces of cells whose switch is on.
 
     Scratch offsets as in `make_flux`; `faces`: the traced densities on both sides and the normals
-    of the faces; `marks`: the HLL switch of the cells on the left and their energies where they
-    have failed; `stress_row`: as in `make_upwind`.
+    of the faces; `left_cells`: the HLL switch of the cells on the left and their energies where
+    they have failed; `stress_row`: as in `make_upwind`.
     """
 
+    is_solid = stress_row != scratch.NO_ROW
+    keeps_pressure = pressure_row != scratch.NO_ROW
     left_row, right_row, face_row = faces
-    switch_row, voided_row = marks
-    withholds = find_leaving_part is not None
+    switch_row, voided_row = left_cells
+    withholds = find_leaving_fraction is not None
 
     @compiled_once(allocates=False)
-    def use_hll(row, first, last, parameters):
-        """HLL where one of the two cells needs it, at the faces first..last, in whole vectors."""
+    def use_hll(whole_scratch, first, last, parameters):
+        """HLL where one of the two cells needs it, at the faces `first` to `last`, both included,
+        in whole vectors."""
         start = (first - 1) // scratch.VECTOR_LANES * scratch.VECTOR_LANES
-        Z = row[start:]  # loops that begin at a number which they do not know are not vectorised
-        for k in range(1, scratch.count_padded(last - start - 1) + 1):
+        # loops that begin at a number which they do not know are not vectorised
+        Z = whole_scratch[start:]
+        for k in range(1, scratch.count_whole(last - start) + 1):
             # states on both sides of the face, with the energy of failed cells
             rho_l = Z[left_row + k]
             p_l = Z[left_row + scratch.TO_P + k]
@@ -354,7 +368,7 @@ def make_hll_flux(
             u_r, v_r = Z[right_row + scratch.TO_U + k], Z[right_row + scratch.TO_V + k]
             c2_l = Z[left_row + scratch.TO_C2 + k]
             c2_r = Z[right_row + scratch.TO_C2 + k]
-            if stress_row:
+            if is_solid:
                 p_l = p_l - Z[stress_row + k]
                 p_r = p_r - Z[stress_row + scratch.TO_NORMAL_RIGHT + k]
             # the HLL flux (theory F3.10)
@@ -373,7 +387,7 @@ def make_hll_flux(
                 u = u_l if from_left else u_r
                 v = v_l if from_left else v_r
                 e = e_l if from_left else e_r
-                flux = riemann.withhold(flux, (u, v, e), find_leaving_part(rho, parameters))
+                flux = riemann.withhold(flux, (u, v, e), find_leaving_fraction(rho, parameters))
             mass, momentum_x, momentum_y, energy, pressure = flux
             # it replaces the sharp one where either cell asks for it
             switch_on = Z[switch_row + k] + Z[scratch.HLL + k]
@@ -385,7 +399,7 @@ def make_hll_flux(
             Z[flux_row + scratch.TO_MOMENTUM_X + k] = momentum_x if switch_on > 0.0 else sharp_x
             Z[flux_row + scratch.TO_MOMENTUM_Y + k] = momentum_y if switch_on > 0.0 else sharp_y
             Z[flux_row + scratch.TO_ENERGY + k] = energy if switch_on > 0.0 else sharp_energy
-            if pressure_row:
+            if keeps_pressure:
                 sharp_pressure = Z[pressure_row + k]
                 Z[pressure_row + k] = pressure if switch_on > 0.0 else sharp_pressure
 
@@ -443,7 +457,7 @@ def make_shear_flux(faces, nodes, shears, stress_row, flux_row, speed_row, geome
             else:
                 Z[flux_row + scratch.TO_MOMENTUM_Y + k] -= stress * area_x
             # velocity of the contact: across the face as fast as the contact in HLLC
-            speed_across = Z[scratch.PUSH + k] / Z[scratch.DRAG + k]
+            speed_across = Z[scratch.S_STAR_NUMERATOR + k] / Z[scratch.S_STAR_DENOMINATOR + k]
             speed_across = (speed_across + Z[face_row + scratch.TO_SWEEP + k]) * inverse
             Z[speed_row + k] = speed_across * nx - speed_along * ny
             Z[speed_row + scratch.TO_Y + k] = speed_across * ny + speed_along * nx

@@ -41,6 +41,8 @@ CHUNK_CELLS = (
     SCRATCH_SPAN - 3 * VECTOR_LANES
 )  # updated cells of a chunk; up to two more are reconstructed
 
+NO_ROW = -1  # instead of the offset of a row: there is none
+
 _next = (CACHE_LINE_ENTRIES - 1 + SCRATCH_SPAN * row for row in count())
 
 
@@ -74,7 +76,7 @@ AREA_X_I, AREA_Y_I, SWEEP_I, X_I, Y_I = _rows(5)
 AREA_X_J, AREA_Y_J, SWEEP_J, X_J, Y_J = _rows(5)
 # between the two halves of HLLC: the upwind side of the contact, its wave, the terms of s*
 RHO_SIDE, U_SIDE, V_SIDE, P_SIDE, W_SIDE, FLOW_SIDE, S_SIDE, S_CUT = _rows(8)
-PUSH, DRAG, SQUARE, VOIDED_ENERGY_SIDE = _rows(4)
+S_STAR_NUMERATOR, S_STAR_DENOMINATOR, SQUARE, VOIDED_ENERGY_SIDE = _rows(4)
 # traces at the faces of the row, rho, u, v, p and c²: towards -i, +i, -j, +j
 TRACE_IN = RHO_IN, *_ = _rows(5)
 TRACE_OUT = RHO_OUT, *_ = _rows(5)

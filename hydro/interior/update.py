@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.eos.base import make_leaving_fraction
 from shockgrid.hydro.eos.conversion import make_conversion
 from shockgrid.hydro.formulas.geometry import compute_lever, push_outwards, stretch_ring
 from shockgrid.hydro.formulas.reconstruction import compute_line_geometry
@@ -31,18 +31,19 @@ def compute_rate(ux, uy, c2, mid_i_x, mid_i_y, mid_j_x, mid_j_y, inverse):
     return (convection + sound) * inverse, (square_i + square_j) * (inverse * inverse)
 
 
-def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
+def make_update(eos_class, geometry, is_solid=False, *, closes_before, opens_own):
     """Make the kernel that updates rows, of an equation of state class and a `Geometry`.
 
-    `finishes`: it turns the waiting conserved quantities of the row before into its new state;
-    `gathers`: it closes the row's own account but for the fluxes through the faces towards +i.
+    `closes_before`: the account of the row before, which waits for the fluxes through its faces
+    towards +i, is closed with these and turned into its new state; `opens_own`: the row's own
+    account is opened, with all but its fluxes towards +i.
     Both in one loop: the one adds and multiplies where the other waits for divisions and roots.
     `is_solid`: rates are those of longitudinal waves; in axisymmetric flow the hoop stress acts.
     """
     to_pressure = make_conversion(eos_class).to_pressure
     opens_voids = eos_class.opens_voids
-    find_leaving_part = make_leaving_part(eos_class)
-    withholds = find_leaving_part is not None
+    find_leaving_fraction = make_leaving_fraction(eos_class)
+    withholds = find_leaving_fraction is not None
     compute_volume = geometry.volume
     curved = geometry.curved
 
@@ -56,7 +57,7 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
         far, with the source, and its new cells.
         """
         for k in range(1, n + 1):
-            if finishes:
+            if closes_before:
                 # conserved quantities of the row before, with the last flux (theory F3.2)
                 mass = Z[scratch.MASS + k] - dt * Z[scratch.FLUX_I_MASS + k]
                 momentum_x = Z[scratch.MOMENTUM_X + k] - dt * Z[scratch.FLUX_I_X + k]
@@ -84,8 +85,8 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                     Z[scratch.VOID_NEW + k] = void_energy
                     Z[scratch.SUM_VOIDED + k] += 1.0 if voided else 0.0
                 if withholds:
-                    leaving_part = find_leaving_part(rho, parameters)
-                    Z[scratch.SUM_EMPTIED + k] += 1.0 if leaving_part < 1.0 else 0.0
+                    leaving_fraction = find_leaving_fraction(rho, parameters)
+                    Z[scratch.SUM_EMPTIED + k] += 1.0 if leaving_fraction < 1.0 else 0.0
                 # kept, with velocities whose squares are not subnormal
                 least_square = LEAST_SPEED_SQUARE * c2
                 u = u if u * u > least_square else 0.0
@@ -126,7 +127,7 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                 Z[scratch.SUM_Y + k] += momentum_y
                 Z[scratch.SUM_ENERGY + k] += total
             # this row: what it holds less the fluxes through the faces known so far
-            if gathers:
+            if opens_own:
                 volume = Z[scratch.VOLUME + k]
                 rho = Z[scratch.RHO + k]
                 u = Z[scratch.U + k]
@@ -175,7 +176,7 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                         (Z[scratch.MID_I_X + k], Z[scratch.MID_I_Y + k]),
                         (Z[scratch.MID_J_X + k], Z[scratch.MID_J_Y + k]),
                     )
-                    push = dt * share * Z[scratch.SOURCE_P + k]
+                    impulse = dt * share * Z[scratch.SOURCE_P + k]
                     if is_solid:
                         # the same of the stress: all of it per radian, the spread per depth
                         plane_area = (
@@ -185,8 +186,8 @@ def make_update(eos_class, geometry, finishes, gathers, is_solid=False):
                         # on every ray of a sphere the same part of the faces' force (F20.11)
                         part_of_faces = Z[scratch.Y_CENTRE + k] * plane_area / Z[scratch.VOLUME + k]
                         hoop = (1.0 - share) * part_of_faces * Z[scratch.STRESS_SPREAD + k]
-                        push = push + dt * (hoop - share * Z[scratch.STRESS_HOOP + k])
-                    momentum_y = stretch_ring(momentum_y, push, lines, (mid_i, mid_j))
+                        impulse = impulse + dt * (hoop - share * Z[scratch.STRESS_HOOP + k])
+                    momentum_y = stretch_ring(momentum_y, impulse, lines, (mid_i, mid_j))
                     Z[scratch.LEVER + k] = lever
                     Z[scratch.SHARE + k] = share
                 Z[scratch.MOMENTUM_Y + k] = momentum_y

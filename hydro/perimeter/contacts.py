@@ -108,22 +108,23 @@ def solve_contact(rim, k, other_rim, m, state_row, wave_law, other_wave_law):
     w = u * nx + v * ny
     w_other = u_other * nx + v_other * ny
     # pressure and normal speed (theory F4.1)
-    p, w = riemann.compute_contact(
+    p_star, w_star = riemann.compute_contact(
         (rho, w, rim[state_row + P, k], c, wave_law),
         (rho_other, w_other, other_rim[state_row + P, m], c_other, other_wave_law),
         jump,
     )
     # velocity of the contact: along the face the mean of both, weighted by impedance
-    z = rho * c
-    z_other = rho_other * c_other
-    mean_x = (z * u + z_other * u_other) / (z + z_other)
-    mean_y = (z * v + z_other * v_other) / (z + z_other)
-    excess = w - (mean_x * nx + mean_y * ny)
+    impedance = rho * c
+    impedance_other = rho_other * c_other
+    both_impedances = impedance + impedance_other
+    mean_x = (impedance * u + impedance_other * u_other) / both_impedances
+    mean_y = (impedance * v + impedance_other * v_other) / both_impedances
+    excess = w_star - (mean_x * nx + mean_y * ny)
     # the same result in both rims
-    rim[P_STAR, k] = p + 0.5 * jump
-    other_rim[P_STAR, m] = p - 0.5 * jump
-    rim[W_STAR, k] = w
-    other_rim[W_STAR, m] = -w
+    rim[P_STAR, k] = p_star + 0.5 * jump
+    other_rim[P_STAR, m] = p_star - 0.5 * jump
+    rim[W_STAR, k] = w_star
+    other_rim[W_STAR, m] = -w_star
     rim[U_STAR, k] = other_rim[U_STAR, m] = mean_x + excess * nx
     rim[V_STAR, k] = other_rim[V_STAR, m] = mean_y + excess * ny
     rim[SLIP, k] = other_rim[SLIP, m] = abs((u - u_other) * ny - (v - v_other) * nx)
@@ -201,8 +202,8 @@ def fill_riemann_flux(rim, k, other_rim, m, beyond, hll, acoustic_weight, curved
     if flux[0] > 0.0:
         flux = riemann.withhold(flux, (inside[1], inside[2], inside[4]), rim[PART_TRACE, k])
     else:
-        leaving_part = other_rim[PART_TRACE + offset, m]
-        flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), leaving_part)
+        leaving_fraction = other_rim[PART_TRACE + offset, m]
+        flux = riemann.withhold(flux, (outside[1], outside[2], outside[4]), leaving_fraction)
     rim[MASS, k], rim[MOMENTUM_X, k], momentum_y, rim[ENERGY, k], pressure = flux
     split_momentum(rim, k, momentum_y, pressure, curved)
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from shockgrid.hydro.eos.base import make_leaving_part
+from shockgrid.hydro.eos.base import make_leaving_fraction
 from shockgrid.hydro.formulas.geometry import PLANE, Geometry
 from shockgrid.hydro.formulas.reconstruction import (
     DEFAULT_LIMITER,
@@ -211,8 +211,8 @@ def make_side_kernels(
     reconstruct = rows.reconstruct
     extrapolate = rows.extrapolate
     fill_faces = make_fill_faces(geometry)
-    find_leaving_part = make_leaving_part(eos_class)
-    withholds = find_leaving_part is not None
+    find_leaving_fraction = make_leaving_fraction(eos_class)
+    withholds = find_leaving_fraction is not None
 
     @compiled_once(allocates=False)
     def gather(state, nodes, parameters, inwards, Z, rim):
@@ -402,7 +402,7 @@ def make_side_kernels(
             rim[E_TRACE, k] = choose_own(energy(rho, p, parameters), voided_energy, voided_energy)
             rim[C_TRACE, k] = c2**0.5
             rim[C2_TRACE, k] = c2
-            rim[PART_TRACE, k] = find_leaving_part(rho, parameters) if withholds else 1.0
+            rim[PART_TRACE, k] = find_leaving_fraction(rho, parameters) if withholds else 1.0
 
     @compiled_once(allocates=False)
     def trace_moving(rim, half_dt, parameters, spans):

@@ -434,9 +434,9 @@ def find_speed_across(rim, k, other_rim, m):
     wave, wave_beyond = riemann.compute_waves(
         w, rim[C2_TRACE, k], w_beyond, other_rim[C2_TRACE, m], square
     )
-    push, drag, _, _ = riemann.compute_contact_speed(
+    s_star_numerator, s_star_denominator, _, _ = riemann.compute_contact_speed(
         (rim[RHO_TRACE, k], rim[P_TRACE, k], w, wave),
         (other_rim[RHO_TRACE, m], other_rim[P_TRACE, m], w_beyond, wave_beyond),
         square,
     )
-    return (push / drag + rim[SWEPT, k]) / square**0.5
+    return (s_star_numerator / s_star_denominator + rim[SWEPT, k]) / square**0.5

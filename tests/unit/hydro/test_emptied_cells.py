@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import box, check_budget, free, make_body, march_whole, wall_off
-from shockgrid.hydro.eos.base import REMAINING_DENSITY_PART, make_leaving_part
+from shockgrid.hydro.eos.base import REMAINING_DENSITY_PART, make_leaving_fraction
 from shockgrid.hydro.eos.materials import find_material
 from shockgrid.hydro.links import join
 from shockgrid.hydro.simulation import Simulation
@@ -49,7 +49,7 @@ def test_a_plate_torn_apart_flies_on(parts, speed):
 
 
 def test_as_much_leaves_as_the_density_says():
-    part = make_leaving_part(type(COPPER.eos))
+    part = make_leaving_fraction(type(COPPER.eos))
     rho = LEAST * np.array([0.0, 0.5, 1.0, 1.25, 2.0, 3.0, 1e9])
     found = part(rho, COPPER.eos.parameters)
     assert found == pytest.approx([0.0, 0.0, 0.0, 0.25, 1.0, 1.0, 1.0], abs=1e-12)

@@ -27,8 +27,8 @@ I_FACES = scratch.RHO_OUT, scratch.RHO_IN, scratch.AREA_X_I
 J_FACES = scratch.RHO_UP + scratch.CELL_BELOW, scratch.RHO_DOWN, scratch.AREA_X_J
 UPWIND_I = *I_FACES, scratch.VOIDED_ENERGY_BEFORE, scratch.ACOUSTIC_BEFORE
 UPWIND_J = *J_FACES, scratch.VOIDED_ENERGY - 1, scratch.ACOUSTIC - 1
-MARKS = scratch.HLL + scratch.CELL_BELOW, scratch.VOIDED_ENERGY + scratch.CELL_BELOW
-HLL = J_FACES, MARKS, scratch.FLUX_J_MASS, 0, True
+LEFT_CELLS = scratch.HLL + scratch.CELL_BELOW, scratch.VOIDED_ENERGY + scratch.CELL_BELOW
+HLL = J_FACES, LEFT_CELLS, scratch.FLUX_J_MASS, scratch.NO_ROW, True
 RADIAL = (
     scratch.PRESSURE_J,
     scratch.FLUX_J_Y,
@@ -37,6 +37,9 @@ RADIAL = (
     scratch.AREA_Y_J,
     scratch.PUSH_J,
 )
+OPEN = {"closes_before": False, "opens_own": True}
+CLOSE = {"closes_before": True, "opens_own": False}
+CLOSE_AND_OPEN = {"closes_before": True, "opens_own": True}
 GAS = ((1.4,),)
 STEP = 0.1, 10.0, (1.4,)  # dt, 1/dt, parameters
 PHASES = {  # how a phase is made, its arguments after the scratch and the number of cells
@@ -62,12 +65,17 @@ PHASES = {  # how a phase is made, its arguments after the scratch and the numbe
     "traces in": (lambda: faces.make_traces(SOUND, True)[0], (1.0, (1.4,))),
     "upwind along i": (lambda: faces.make_upwind(*UPWIND_I, False, False), ()),
     "upwind along j": (lambda: faces.make_upwind(*UPWIND_J, True, True), ()),
-    "flux": (lambda: faces.make_flux(ENERGY, scratch.AREA_X_J, scratch.FLUX_J_MASS, 0, False), GAS),
+    "flux": (
+        lambda: faces.make_flux(
+            ENERGY, scratch.AREA_X_J, scratch.FLUX_J_MASS, scratch.NO_ROW, False
+        ),
+        GAS,
+    ),
     "HLL flux": (lambda: faces.make_hll_flux(ENERGY, *HLL), (16, (1.4,))),
-    "gathering": (lambda: update.make_update(IdealGas, PLANE, False, True), STEP),
-    "new states": (lambda: update.make_update(IdealGas, PLANE, True, False), STEP),
-    "update": (lambda: update.make_update(IdealGas, PLANE, True, True), STEP),
-    "radial gathering": (lambda: update.make_update(IdealGas, CURVED, False, True), STEP),
+    "gathering": (lambda: update.make_update(IdealGas, PLANE, **OPEN), STEP),
+    "new states": (lambda: update.make_update(IdealGas, PLANE, **CLOSE), STEP),
+    "update": (lambda: update.make_update(IdealGas, PLANE, **CLOSE_AND_OPEN), STEP),
+    "radial gathering": (lambda: update.make_update(IdealGas, CURVED, **OPEN), STEP),
     "radial push": (lambda: axisymmetric.make_push(CURVED.split, *RADIAL), ()),
     "radial lines": (lambda: axisymmetric.fill_lines, ()),
     "radial shifts": (lambda: axisymmetric.fill_shift_after, ()),

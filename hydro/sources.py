@@ -46,19 +46,21 @@ class BodySource:
         if self.function is None:
             return
         self.gained[:] = 0.0
-        pushes = []
+        accelerations = []
         gains = []
         for block in (self.blocks[number] for number in self.blocks.own):
             block.copy_start()
             held = block.list_starts()
-            push, gained = self._apply(block, held, block.get_start("carried"), t, 0.5 * dt)
-            pushes.append(block.gather_perimeter(push))
-            gains.append((*gained, push.any()))
-        pushes = self.blocks.exchange_starts(pushes)
+            acceleration, gained = self._apply(block, held, block.get_start("carried"), t, 0.5 * dt)
+            accelerations.append(block.gather_perimeter(acceleration))
+            gains.append((*gained, acceleration.any()))
+        accelerations = self.blocks.exchange_starts(accelerations)
         gains = self.blocks.exchange_rows(gains, 4)
-        for block, push, (*gained, pushed) in zip(self.blocks, pushes, gains, strict=True):
+        for block, acceleration, (*gained, pushed) in zip(
+            self.blocks, accelerations, gains, strict=True
+        ):
             self.gained += gained
-            block.body_acceleration = push if pushed else None
+            block.body_acceleration = acceleration if pushed else None
 
     def end_step(self, t: float, dt: float) -> None:
         """The second half, on the accepted state; also adds it to the block's totals."""
@@ -84,12 +86,16 @@ class BodySource:
         Returns the acceleration (2, ni, nj) and the block's gain (see `gained`).
         """
         x, y = compute_centres(block.nodes)
-        push_x, push_y, heat = self.function(block, x, y, t, dt)
-        push = np.array([np.broadcast_to(q, x.shape) for q in (push_x, push_y)])
+        acceleration_x, acceleration_y, heat = self.function(block, x, y, t, dt)
+        acceleration = np.array(
+            [np.broadcast_to(q, x.shape) for q in (acceleration_x, acceleration_y)]
+        )
         state, *void_arrays = held
         inside = state[:, 1:-1, 1:-1]
         rho, u, v, _ = inside
-        du, dv = np.broadcast_arrays(dt * np.asarray(push_x), dt * np.asarray(push_y))
+        du, dv = np.broadcast_arrays(
+            dt * np.asarray(acceleration_x), dt * np.asarray(acceleration_y)
+        )
         mass = rho * block.volume
         work = (u + 0.5 * du) * du + (v + 0.5 * dv) * dv + heat
         gained = np.array([float((mass * q).sum()) for q in (du, dv, work)])
@@ -100,4 +106,4 @@ class BodySource:
             if block.stress is not None:  # what is heated closes its voids
                 cells = inside, *void_arrays
                 block.stress.spall_again(block.eos, cells, carried[:, 1:-1, 1:-1], block.nodes)
-        return push, gained
+        return acceleration, gained

@@ -67,7 +67,7 @@ def add_friction(leader, follower, facets, count, friction, dt):
     """Add Coulomb friction to the outward fluxes of both sides of closed facets.
 
     leader, follower: cells and line of each, the rows RHO to LENGTH of the rim (6, faces) and
-    `LineArrays`.
+    `ContactLineArrays`.
     The traction is `friction` times the contact pressure against the slip of the cells beside the
     facet, but no more than stops it within the step; without end it welds.  It works at the mean
     of both velocities by the other's impedance, so that its heat goes into the cells as their

@@ -123,15 +123,15 @@ def fill_radius_weighted_areas(old, new, orientation, inverse_dt, facets, count)
 @compiled_once
 def compute_van_leer_weights(square_before, square_after):
     """Weights of two differences in van Leer's mean, from their squares."""
-    square_before = square_before**0.5
-    square_after = square_after**0.5
-    total = square_before + square_after
-    return (square_after / total, square_before / total) if total > 0.0 else (0.0, 0.0)
+    size_before = square_before**0.5
+    size_after = square_after**0.5
+    total = size_before + size_after
+    return (size_after / total, size_before / total) if total > 0.0 else (0.0, 0.0)
 
 
 @kernel
 def fill_line_slopes(nodes, arrays):
-    """Middles of the faces, and limited slopes of the states along the line: of `LineArrays`.
+    """Middles of the faces, limited slopes of the states along the line, of `ContactLineArrays`.
 
     nodes (2, n + 1).  The velocity is limited as a vector, so that a turned flow has the same
     slopes; there are none at both ends.
@@ -152,16 +152,16 @@ def fill_line_slopes(nodes, arrays):
         length = (dx * dx + dy * dy) ** 0.5
         slopes[ALONG_X, k] = dx / length
         slopes[ALONG_Y, k] = dy / length
-        before = (middles[0, k] - middles[0, k - 1]) ** 2 + (middles[1, k] - middles[1, k - 1]) ** 2
-        after = (middles[0, k + 1] - middles[0, k]) ** 2 + (middles[1, k + 1] - middles[1, k]) ** 2
-        before = 1.0 / before**0.5
-        after = 1.0 / after**0.5
-        u = (states[U, k] - states[U, k - 1]) * before
-        u_next = (states[U, k + 1] - states[U, k]) * after
-        v = (states[V, k] - states[V, k - 1]) * before
-        v_next = (states[V, k + 1] - states[V, k]) * after
-        p = (states[P, k] - states[P, k - 1]) * before
-        p_next = (states[P, k + 1] - states[P, k]) * after
+        square_before = measure_square(middles, k - 1)
+        square_after = measure_square(middles, k)
+        inverse_before = 1.0 / square_before**0.5
+        inverse_after = 1.0 / square_after**0.5
+        u = (states[U, k] - states[U, k - 1]) * inverse_before
+        u_next = (states[U, k + 1] - states[U, k]) * inverse_after
+        v = (states[V, k] - states[V, k - 1]) * inverse_before
+        v_next = (states[V, k + 1] - states[V, k]) * inverse_after
+        p = (states[P, k] - states[P, k - 1]) * inverse_before
+        p_next = (states[P, k + 1] - states[P, k]) * inverse_after
         if u * u_next + v * v_next > 0.0:
             weight_before, weight_after = compute_van_leer_weights(
                 u * u + v * v, u_next * u_next + v_next * v_next

@@ -72,14 +72,14 @@ def make_facets(count: int, curved: bool) -> Facets:
     )
 
 
-class LineArrays(NamedTuple):
+class ContactLineArrays(NamedTuple):
     """Arrays over the n faces of one of two lines, in its order.
 
     states (7, n): see above; laws (3, n): `EquationOfState.wave_law` of the materials; middles
-    (2, n) of the faces; slopes (5, n) of the states along the line; squares (n,): of a facet's
-    length over its weight in `sums`; gap_p (n,): pressure beyond a face where it is free; sums
-    (6, n) over the faces' facets; flux (6, n), outwards; rigid: it is a wall, which moves with
-    `velocity` (2,) and has no states.
+    (2, n) of the faces; slopes (5, n) of the states along the line; squares (n,): squared
+    lengths of the faces; gap_p (n,): pressure beyond a face where it is free; sums (6, n) over the
+    faces' facets, each weighted by its part of the face's length; flux (6, n), outwards; rigid: it
+    is a wall, which moves with `velocity` (2,) and has no states.
     """
 
     states: np.ndarray
@@ -94,10 +94,10 @@ class LineArrays(NamedTuple):
     velocity: np.ndarray
 
 
-def make_line_arrays(laws: np.ndarray, rigid: bool = False) -> LineArrays:
+def make_line_arrays(laws: np.ndarray, rigid: bool = False) -> ContactLineArrays:
     """Arrays for a line of faces with these wave laws (3, n); beyond a wall there is no void."""
     count = laws.shape[1]
-    return LineArrays(
+    return ContactLineArrays(
         states=np.zeros((TRACE_ROWS, count)),
         laws=np.ascontiguousarray(laws, dtype=float),
         middles=np.zeros((2, count)),

@@ -56,7 +56,8 @@ ROUND_OFF_TENSION = 1e-6
 def compute_state_at(line, k, x, y):
     """State of face `k` at a point of its line: rho, u, v, p, c and wave law.
 
-    A wall has a velocity only.
+    rho and c are those of the face: they only weigh the jumps of velocity and pressure, which are
+    small themselves in a smooth flow.  A wall has a velocity only.
     """
     if line.rigid:
         return 0.0, line.velocity[0], line.velocity[1], 0.0, 0.0, (0.0, 0.0, 0.0)

@@ -172,7 +172,7 @@ def write_line(nodes_new, location, line):
         nodes_new[1, i, j] = line[1, k]
 
 
-class LineArrays(NamedTuple):
+class MovingLineArrays(NamedTuple):
     """Arrays of a line of n nodes, as kernels take them.
 
     damping (2, n) and extra_velocity (2, n): velocities besides that of the contact [m/s]; moved
@@ -211,8 +211,8 @@ def respace_line(moved, spacing, relax, shape, walls, work):
 def move_and_respace_line(nodes, nodes_new, location, rim, dt, arrays, shaping, walls):
     """Move a line's nodes (`move_line`, where dt > 0), spread them and write them to `nodes_new`.
 
-    arrays: `LineArrays`.  shaping: `relax`, the part of the way to the spacing that nodes go (0:
-    they are not spread; ONLY_MOVED: nor written), and the shape: whether the curve is a spline,
+    arrays: `MovingLineArrays`.  shaping: `relax`, the part of the way to the spacing that nodes go
+    (0: they are not spread; ONLY_MOVED: nor written), and the shape: whether the curve is a spline,
     whether nodes move parallel to their neighbours' chords, whether it is periodic, whether it is
     closed, and the shortest segment that turning asks for [m] (0: none, as of
     `fill_turning_spacing`).  walls at both ends as in `fill_redistributed`.  Returns the
@@ -390,7 +390,7 @@ class Line:
         self.closed = False  # does it end where it begins, or at its periodic image?
         self.shortest = 0.0  # segment that turning asks for [m]; 0: spaced by length alone
         self._turning = np.zeros(count - 1)
-        self._arrays = LineArrays(
+        self._arrays = MovingLineArrays(
             self.damping, self.extra_velocity, self.moved, self.spacing, self.spacing.copy(),
             self._turning, np.empty((8, count)),
         )  # fmt: skip

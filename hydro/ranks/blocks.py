@@ -119,10 +119,10 @@ class Blocks(list[Block]):
     def exchange_states(self) -> None:
         """The states along the sides and the sums again, where something has acted on them."""
 
-    def exchange_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def exchange_starts(self, accelerations: Sequence[np.ndarray]) -> list[np.ndarray]:
         """The states that a step starts from, along the sides; the accelerations (2, faces) by a
         body source of all blocks, from those of one's own."""
-        return list(pushes)
+        return list(accelerations)
 
     def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         """A row of `width` numbers for every block, from those of one's own blocks."""

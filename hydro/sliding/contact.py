@@ -85,8 +85,8 @@ class Chain:
         self.orientation = -self.orientation
 
     def make_arrays(self) -> None:
-        """Arrays over its faces, in the order in which it runs: of `LineArrays`, and of `surface`
-        (5, faces), the contact states."""
+        """Arrays over its faces, in the order in which it runs: of `ContactLineArrays`, and of
+        `surface` (5, faces), the contact states."""
         self.arrays = make_line_arrays(self.list_wave_laws())
         self.surface = np.zeros((SURFACE_ROWS, self.count))
 

@@ -144,7 +144,7 @@ def fill_variational_corners(i, cells, low, count, Z):
 
 @kernel
 def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
-    """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
+    """Fill `H` (NODE_ROW_SIZE a row of nodes) and `gradient` for node columns first..last-1.
 
     sides: (along_i, along_j, blend_i, blend_j) of a workspace; cells: volume (ni, nj), active
     (4, ni, nj), and the numbers smoothness and orthogonality; active corners of `nodes` must be
@@ -160,8 +160,8 @@ def assemble_variational(nodes, sides, cells, first, last, H, gradient, Z):
     lines = at.LineInputs(along_i, along_j, blend_i, no_departure, no_chords, 0.0, 0.0)
     at.begin_columns(nodes, along_j, blend_i, blend_j, 0.0, low, count, Z)
     for i in range(ni):
-        here = H[i * at.NODE_ROWS : (i + 1) * at.NODE_ROWS]
-        before = H[max(i - 1, 0) * at.NODE_ROWS : (max(i - 1, 0) + 1) * at.NODE_ROWS]
+        here = H[i * at.NODE_ROW_SIZE : (i + 1) * at.NODE_ROW_SIZE]
+        before = H[max(i - 1, 0) * at.NODE_ROW_SIZE : (max(i - 1, 0) + 1) * at.NODE_ROW_SIZE]
         # corners of this row of cells
         at.begin_row(nodes, i, lines, low, count, Z)
         for col in range(count):

@@ -34,7 +34,7 @@ FINE_EAST = 12 * CHUNK_SPAN
 FINE_OWN = 16 * CHUNK_SPAN
 FINE_PIVOT = 19 * CHUNK_SPAN
 FINE_FACTOR = 22 * CHUNK_SPAN
-NODE_ROWS = 26 * CHUNK_SPAN
+NODE_ROW_SIZE = 26 * CHUNK_SPAN
 
 # Scratch of the assembly: one row each.
 #
@@ -510,7 +510,7 @@ def fill_own_blocks(cells, here, before, Z):
         )  # fmt: skip
         store_block(factor, KEPT_OWN_BLOCKS + FINE_FACTOR, col, Z)
     # all of them into the matrix
-    for row in range(FINE_OWN, NODE_ROWS, CHUNK_SPAN):
+    for row in range(FINE_OWN, NODE_ROW_SIZE, CHUNK_SPAN):
         for col in range(1, cells):
             here[row + col] = Z[KEPT_OWN_BLOCKS + row + col]
 
@@ -696,7 +696,7 @@ def make_assembly(smooth):
 
     @kernel(allocates=False)
     def assemble(nodes, inputs, spread, first, last, H, gradient, Z):
-        """Fill `H` (NODE_ROWS a row of nodes) and `gradient` for node columns first..last-1.
+        """Fill `H` (NODE_ROW_SIZE a row of nodes) and `gradient` for node columns first..last-1.
 
         `nodes` (2, ni+1, nj+1) must be convex (any grid where `smooth`, with e = `spread`),
         `inputs` are `BarrierInputs`; `gradient` has the shape of `nodes` and is written at inner
@@ -708,8 +708,8 @@ def make_assembly(smooth):
         corner_coefficients = functional.take_corner_coefficients(inputs)
         begin_block(nodes, inputs, low, cells, Z)
         for i in range(ni):
-            here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
-            before = H[max(i - 1, 0) * NODE_ROWS : (max(i - 1, 0) + 1) * NODE_ROWS]
+            here = H[i * NODE_ROW_SIZE : (i + 1) * NODE_ROW_SIZE]
+            before = H[max(i - 1, 0) * NODE_ROW_SIZE : (max(i - 1, 0) + 1) * NODE_ROW_SIZE]
             # corners of this row of cells
             fill_row_edges(nodes, i, inputs, low, cells, Z)
             measure_corners(spread, cells, Z)

@@ -19,7 +19,7 @@ from shockgrid.regrid.barrier.assembly import (
     FINE_NORTH,
     FINE_OWN,
     FINE_PIVOT,
-    NODE_ROWS,
+    NODE_ROW_SIZE,
     take_block,
     transpose_block,
 )
@@ -143,8 +143,8 @@ def multiply(directions, beta, first, last, H, out, totals, Z):
         load_direction_row(directions, beta, i + 1, low, count + 2, Z)
         # product of the row in the middle
         if i > 0:
-            here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
-            before = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            here = H[i * NODE_ROW_SIZE : (i + 1) * NODE_ROW_SIZE]
+            before = H[(i - 1) * NODE_ROW_SIZE : i * NODE_ROW_SIZE]
             fill_product_row(here, before, count, Z)
             out_x, out_y = out[0, i, first:last], out[1, i, first:last]
             for k in range(count):
@@ -193,7 +193,7 @@ def advance(alpha, step, vectors, first, last, H, totals):
                 z_y[k] = r_y[k]
         else:
             before_x, before_y = z[0, i - 1, first:last], z[1, i - 1, first:last]
-            before = H[(i - 1) * NODE_ROWS : i * NODE_ROWS]
+            before = H[(i - 1) * NODE_ROW_SIZE : i * NODE_ROW_SIZE]
             for k in range(count):
                 factor = transpose_block(take_block(before, FINE_FACTOR, k + 1))
                 passed_x, passed_y = multiply_block(factor, before_x[k], before_y[k])
@@ -203,7 +203,7 @@ def advance(alpha, step, vectors, first, last, H, totals):
         total[k] = 0.0
     # backward, and the sums
     for i in range(ni - 1, 0, -1):
-        here = H[i * NODE_ROWS : (i + 1) * NODE_ROWS]
+        here = H[i * NODE_ROW_SIZE : (i + 1) * NODE_ROW_SIZE]
         r_x, r_y = r[0, i, first:last], r[1, i, first:last]
         z_x, z_y = z[0, i, first:last], z[1, i, first:last]
         after_x, after_y = z[0, i + 1, first:last], z[1, i + 1, first:last]

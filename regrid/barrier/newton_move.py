@@ -1,4 +1,4 @@
-"""One move of the barrier regridder: from a valid grid to new sides.
+"""One move of the barrier regridder: from a valid grid to new sides.  What is tried, in order:
 
     1 the displaced grid (R6.5), if necessary after a correction of its smooth errors (R4.13)
     2 Newton steps from it, shortened where corners would lose too much area (R4.8)

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from shockgrid.regrid.barrier.newton_move import Folded, NewtonMove
+from shockgrid.regrid.barrier.orientation import Orientation, choose_orientation, is_convex
 from shockgrid.regrid.barrier.points import (
     FRACTIONS_OF_TWO_POINTS,
     OPENED_FRACTIONS,
@@ -27,7 +28,6 @@ from shockgrid.regrid.barrier.points import (
 )
 from shockgrid.regrid.barrier.side_inputs import fill_family_weights
 from shockgrid.regrid.barrier.tuning import DEFAULT, OPTIONS, Tuning
-from shockgrid.regrid.barrier.turning import Orientation, choose_orientation, is_convex
 from shockgrid.regrid.barrier.workspace import Workspace, find_spacing_departure, has_departures
 from shockgrid.regrid.errors import BadInput, RegridFailure
 from shockgrid.regrid.measure.crossings import find_crossing

@@ -88,7 +88,7 @@ from shockgrid.regrid.measure.quality import find_areas, square
 TILE_ROWS = 8
 OLD_TILE = 74 * CHUNK_SPAN
 NEW_TILE = (74 + 2 * TILE_ROWS) * CHUNK_SPAN
-RESIDUAL_ROWS = (74 + 4 * TILE_ROWS) * CHUNK_SPAN
+RESIDUAL_SIZE = (74 + 4 * TILE_ROWS) * CHUNK_SPAN
 OLD_ROWS = OLD_X, OLD_Y, OLD_NEXT_X, OLD_NEXT_Y
 ROWS = HERE_X, HERE_Y, NEXT_X, NEXT_Y
 OLD_NEXT = OLD_ROWS[2:]
@@ -756,7 +756,7 @@ def make_residual_check(parallel):
         of `grids` because numba hands threads no tuple within a tuple.
 
         `chunks`: their first node columns (chunks + 1), extremes (chunks, 5) and scratch (chunks,
-        RESIDUAL_ROWS or more); extremes[0] receives the overall result.  Sums are over columns in
+        RESIDUAL_SIZE or more); extremes[0] receives the overall result.  Sums are over columns in
         order.
         """
         columns, extremes, scratch = chunks

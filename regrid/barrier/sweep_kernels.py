@@ -49,7 +49,7 @@ RIGHT_SIDE_ROW = 56 * SWEEP_SPAN
 COUPLING_ROW = 58 * SWEEP_SPAN
 # Per line, over all rows: sum of |R|², first and last active row.
 RESIDUAL, ACTIVE_FIRST, ACTIVE_LAST = (k * SWEEP_SPAN for k in range(59, 62))
-SWEEP_ROWS = 62 * SWEEP_SPAN
+SWEEP_SIZE = 62 * SWEEP_SPAN
 # rows kept per row of nodes for the back substitution: INVERSE_ROW to COUPLING_ROW
 KEPT_ROWS = 6
 KEPT_LENGTH = KEPT_ROWS * SWEEP_SPAN

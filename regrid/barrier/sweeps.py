@@ -34,7 +34,7 @@ from shockgrid.regrid.barrier.side_inputs import (
 from shockgrid.regrid.barrier.sweep_kernels import (
     KEPT_LENGTH,
     MOST_CHUNK_LINES,
-    SWEEP_ROWS,
+    SWEEP_SIZE,
     fill_active_boxes,
     fill_directions,
 )
@@ -175,7 +175,7 @@ class _SweepWork:
         self.along_i, self.along_j = np.zeros((4, ni)), np.zeros((4, nj))
         self.blends = np.zeros(ni + 1), np.zeros(nj + 1)
         self.kept = np.zeros((ni + 1) * KEPT_LENGTH)
-        self.scratch = np.zeros(SWEEP_ROWS)
+        self.scratch = np.zeros(SWEEP_SIZE)
         self.per_line, self.other_lines = np.zeros((2, 3, nj + 1))
         self.workspace: Workspace | None = None
         self.exempt_corners = 0

@@ -17,7 +17,7 @@ import numpy as np
 
 from shockgrid.regrid.algebraic import SideMotion, fill_curves
 from shockgrid.regrid.barrier.assembly import (
-    NODE_ROWS,
+    NODE_ROW_SIZE,
     assemble_barrier,
     assemble_on_threads,
     assemble_smoothed,
@@ -31,7 +31,7 @@ from shockgrid.regrid.barrier.residual_estimate import (
     COSECANT,
     LEAST_SCALED,
     MOST_SHRUNK,
-    RESIDUAL_ROWS,
+    RESIDUAL_SIZE,
     STRAYED,
     check_residual_serial,
     check_residual_threaded,
@@ -44,7 +44,7 @@ from shockgrid.regrid.barrier.step_control import (
     measure_corners,
 )
 from shockgrid.regrid.barrier.tuning import DEFAULT, Tuning
-from shockgrid.regrid.barrier.untangle import ENERGY_ROW, ENERGY_ROWS, LEAST_AREA_ROW, fill_energy
+from shockgrid.regrid.barrier.untangle import ENERGY_ROW, ENERGY_SIZE, LEAST_AREA_ROW, fill_energy
 from shockgrid.regrid.jit import can_use_threads
 from shockgrid.regrid.measure.corners import BLOCK_CORNERS
 from shockgrid.regrid.measure.crossings import BoundaryCheck
@@ -172,7 +172,7 @@ class Workspace:
         self.whole_columns = self.columns.copy()
         self.whole_columns[-1] += -(self.nj - self.columns[-2]) % NUMBERS_PER_VECTOR
         self.extremes = np.zeros((chunks, 5))
-        shape = chunks, max(ENERGY_ROWS, RESIDUAL_ROWS)
+        shape = chunks, max(ENERGY_SIZE, RESIDUAL_SIZE)
         self.scratch = Carver(np.zeros(count_numbers(*shape))).cut(*shape)
 
     def _list_arrays(self) -> None:
@@ -191,7 +191,7 @@ class Workspace:
             "coarse_memory": ((self.coarse.size,), 0),
             "gradient": (self.shape, 0),
             **dict.fromkeys(VECTORS, (vector_shape, 1)),
-            "H": ((chunks, (self.ni + 1) * NODE_ROWS), 0),
+            "H": ((chunks, (self.ni + 1) * NODE_ROW_SIZE), 0),
             "curve": (self.shape, 0),
         }
         self.size = sum(count_numbers(*shape) for shape, _ in self.arrays.values())

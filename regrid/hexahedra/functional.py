@@ -50,7 +50,7 @@ HIGH_ROW = 115 * HEXAHEDRON_SPAN  # of those along i and j, from the cells befor
 # of cells: for the edge along i; summed over all three
 BLOCK_ROW = 127 * HEXAHEDRON_SPAN
 SUMMED_BLOCK_ROW = 133 * HEXAHEDRON_SPAN
-HEXAHEDRON_ROWS = 139 * HEXAHEDRON_SPAN
+HEXAHEDRON_SIZE = 139 * HEXAHEDRON_SPAN
 # Direction of the eight edges, and their first nodes relative to the node (i, j).
 EDGES = (
     (0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1),

@@ -33,7 +33,7 @@ from shockgrid.regrid.hexahedra.faces import (
     move_with_faces,
 )
 from shockgrid.regrid.hexahedra.functional import (
-    HEXAHEDRON_ROWS,
+    HEXAHEDRON_SIZE,
     LONGEST_HEXAHEDRON_ROW,
     ONLY_ENERGY,
     WITH_MATRIX,
@@ -100,7 +100,7 @@ class Workspace:
         self.blocks = np.zeros((2, 6, *nodes))
         self.strength = np.empty(cells)
         self.planes = np.empty(cells[0])
-        self.scratch = np.zeros(HEXAHEDRON_ROWS)
+        self.scratch = np.zeros(HEXAHEDRON_SIZE)
         self.coarse = CoarseBlock(cells)
 
 

@@ -27,8 +27,8 @@ import numpy as np
 
 from shockgrid.regrid.algebraic import transfinite_grid
 from shockgrid.regrid.barrier.given_spacing import agrees_with_sides, find_given_spacing
+from shockgrid.regrid.barrier.orientation import is_convex
 from shockgrid.regrid.barrier.repair import repair_grid
-from shockgrid.regrid.barrier.turning import is_convex
 from shockgrid.regrid.domains import DOMAINS, MovingDomain, make_domain
 from shockgrid.regrid.domains_in_space import (
     BLOCKS,

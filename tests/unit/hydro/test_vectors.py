@@ -119,7 +119,7 @@ def test_rows_of_cells_are_vectors(name):
         pytest.skip("the compiler of this numba leaves the loop scalar: slower, the same numbers")
     if name in CHECKS:
         kernel, arguments = CHECKS[name]
-        packed, scalar = count_kinds(kernel.py_func, *arguments, np.ones(check.RESIDUAL_ROWS))
+        packed, scalar = count_kinds(kernel.py_func, *arguments, np.ones(check.RESIDUAL_SIZE))
     else:
         make, arguments = PHASES[name]
         count = 1 if name == "HLL flux" else 16

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from shockgrid.regrid.barrier.orientation import is_convex
 from shockgrid.regrid.barrier.regridder import BarrierRegridder
 from shockgrid.regrid.barrier.repair import repair_grid
-from shockgrid.regrid.barrier.turning import is_convex
 from shockgrid.regrid.errors import BadInput, RegridFailure
 from shockgrid.regrid.given import find_start, make_boundary, orient_sides
 from shockgrid.regrid.measure.crossings import find_crossing

@@ -472,14 +472,20 @@ def make_flow_kernels(
     def advance(old, new, rim, dt, parameters, scratches, tiles, tile_totals):
         """Advance the tiles tiles[0]..tiles[1] - 1 of a block by one step.
 
-        old: state (4, ni + 2, nj + 2), rho, u, v, p with one layer of ghost cells; void energy (ni,
-        nj): energy of cells with voids minus that of intact material at the same density and p = 0;
-        nodes (2, ni + 1, nj + 1); for a solid, then those of its `SolidArrays`.  new: the first
-        three, of which two are written, the rates and crowding (ni, nj) of the new cells, theory
-        F7.1, F7.3, and the rates of mass through faces, (ni + 1, nj) and (ni, nj + 1), (1, 1) where
-        nobody asks for them.  rim: rows of `hydro.rim` with the fluxes through the sides and the
-        lengths of the ghosts; scratch (threads, SIZE); tile_totals (tiles, 8): columns as in
-        `hydro.rows`.
+        old: a tuple of
+            state (4, ni + 2, nj + 2): rho, u, v, p with one layer of ghost cells;
+            void energy (ni, nj): of cells with voids, the energy minus that of intact material at
+                the same density and p = 0;
+            nodes (2, ni + 1, nj + 1);
+            and of a solid those of its `SolidArrays`.
+        new: a tuple of
+            state and void energy, which are written, and nodes, which are read;
+            rates and crowding (ni, nj) of the new cells, theory F7.1, F7.3;
+            rates of mass through faces, (ni + 1, nj) and (ni, nj + 1), or (1, 1) where nobody asks
+                for them.
+        rim: rows of `hydro.rim`, with the fluxes through the sides and the lengths of the ghosts.
+        scratches (threads, SIZE).
+        tile_totals (tiles, 8): columns as in `hydro.rows`.
         """
         for tile in range(tiles[0], tiles[1]):
             advance_tile(old, new, rim, dt, parameters, tile, scratches[0], tile_totals)

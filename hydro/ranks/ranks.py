@@ -83,7 +83,7 @@ class Ranks(Blocks):
         self._find_pieces(comm)
         self._make_messages()
         self._start_copies: messages.Message | None = None  # where a body source acts
-        self._pushes: list[np.ndarray] = []
+        self._accelerations: list[np.ndarray] = []
         self.busy = False  # with what all ranks do together
         self.whole = True  # is the inside of all blocks that of this step here?
         for number, block in enumerate(blocks):
@@ -205,16 +205,18 @@ class Ranks(Blocks):
             if owner != self.rank:
                 self[number].totals.read_array()
 
-    def exchange_starts(self, pushes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def exchange_starts(self, accelerations: Sequence[np.ndarray]) -> list[np.ndarray]:
         if self._start_copies is None:
-            self._pushes = [np.zeros((2, block.rim.faces)) for block in self]
-            pushed = [(lambda _, push=push: push, np.arange(push.size)) for push in self._pushes]
+            self._accelerations = [np.zeros((2, block.rim.faces)) for block in self]
+            pushed = [
+                (lambda _, push=push: push, np.arange(push.size)) for push in self._accelerations
+            ]
             parts = [[*_find_starts(block), push] for block, push in zip(self, pushed, strict=True)]
             self._start_copies = self._make("sources", parts)
-        for number, push in zip(self.own, pushes, strict=True):
-            self._pushes[number][...] = push
+        for number, push in zip(self.own, accelerations, strict=True):
+            self._accelerations[number][...] = push
         self._start_copies.exchange()
-        return self._pushes
+        return self._accelerations
 
     def exchange_rows(self, rows: Sequence[Row], width: int) -> Table:
         table = self._gather_table(rows, width, self._own_counts)

@@ -4,20 +4,8 @@
     python docs/generate.py --check          exit code 1 where a region is out of date
     python docs/generate.py --run [NAME...]  first run all of docs/figures.toml, or what is named
 
-A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`:
-
-    head PROBLEM                docstring of the problem's module
-    verify PROBLEM...           finest grids of results/verify.json ("first": one of each problem)
-    runs NAME... | COLUMN; ...  a table, one run a row; see `find_cell` for what a column may be
-    sizes NAME... | SIZE... | COLUMN; ... | ERROR   runs NAME-SIZE a row, a column a size
-    output NAME                 the command and its output: a run's summary, a study's orders
-    bench [FILE: ]TABLE [| COLUMN=VALUE]   a table of results/bench.json, or of another file there,
-                                or those of its rows
-    result NAME                 docs/results/NAME.txt, which a benchmark or a trial has written
-    causes ends                 why runs end early, of `runs.early_end.causes`
-    rules verdict               when the verdict of a run has a reservation
-
-Names of runs may have wildcards.  Results hold numbers and words of the run, never the time of day.
+A region stands between `<!-- generated: KIND ARGUMENTS -->` and `<!-- end generated -->`; `KINDS`
+has the kinds, whose functions say what the arguments are.  Names of runs may have wildcards.
 Note: a result is as old as its last run; after a change of the scheme run all again.
 """
 
@@ -46,7 +34,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.result_tables import make_table  # noqa: E402
 from shockgrid.problems.registry import read_docstring  # noqa: E402
 from shockgrid.runs.early_end.causes import ENDS  # noqa: E402
-from shockgrid.runs.inspection.account import RULES, describe_convexity, measure_drifts  # noqa: E402
+from shockgrid.runs.inspection.account import RULES, measure_drifts  # noqa: E402
 from shockgrid.runs.store.reader import RunData  # noqa: E402
 from shockgrid.runs.verify import HEADS, format_record  # noqa: E402
 
@@ -56,10 +44,6 @@ REGION = re.compile(
 )
 SHOCKGRID = [sys.executable, "-m", "shockgrid"]
 FIGURES = tomllib.loads((DOCS / "figures.toml").read_text(encoding="utf-8"))
-USUAL = (
-    "steps", "sub-moves", "untangling events", "minimum scaled Jacobian", "worst aspect",
-    "largest drift",
-)  # fmt: skip
 
 
 def read_result(name: str) -> dict[str, Any]:
@@ -105,7 +89,7 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
         result = {"command": command, "label": figure.get("label", name)}
         if "study" in figure:
             shutil.copy(directory / "study.png", DOCS / "pictures" / f"{name}.png")
-            return {**result, "output": find_orders(done.stdout)}
+            return result
         if "deck" not in figure:
             return {**result, "output": [line.rstrip() for line in done.stdout.splitlines()]}
         result |= read_run(directory, done.stderr)
@@ -114,12 +98,6 @@ def make_result(name: str, figure: dict[str, Any]) -> dict[str, Any]:
             words = (directory / "early-end.txt").read_text(encoding="utf-8")
             result["output"] = words.replace(str(directory), "DIR").splitlines()
         return result
-
-
-def find_orders(said: str) -> list[str]:
-    """The table of orders in the summary of a study; no lines where there is none."""
-    _, title, rest = said.partition("orders over ")
-    return [line.rstrip() for line in (title + rest).partition("\n\n")[0].splitlines()]
 
 
 def read_run(directory: Path, said: str) -> dict[str, Any]:
@@ -142,14 +120,10 @@ def read_run(directory: Path, said: str) -> dict[str, Any]:
     return {
         "reason": reason,
         "steps": data.dumps[-1].step,
-        "t": data.dumps[-1].t,
-        "cells": {b.name: [n - 1 for n in b.nodes.shape[1:]] for b in data.dumps[-1].blocks},
         "sub-moves": reduce("regrid_sub_moves", sum),
         "untangling events": reduce("regrid_rescues", sum),
-        "retries": reduce("retries", sum),
         "minimum scaled Jacobian": reduce("least_scaled_jacobian", min),
         "worst aspect": reduce("worst_aspect", max),
-        "convexity": describe_convexity(history),
         "drifts": {name: float(f"{drift:.2g}") for name, drift in measure_drifts(history).items()},
         "values": list(read_values(own)),
         "output": own,
@@ -192,37 +166,37 @@ def find_cell(result: dict[str, Any], column: str) -> str:
     return "" if value is None else str(value)
 
 
-def fill_runs(arguments: str) -> list[str]:
-    """`NAME... | COLUMN; HEAD=COLUMN; ...`, the usual columns where none are given.
+def split_columns(words: str) -> dict[str, str]:
+    """`COLUMN; HEAD=COLUMN; ...` as columns by their heads."""
+    columns = (word.strip() for word in words.split(";") if word.strip())
+    return {head: column or head for head, _, column in (one.partition("=") for one in columns)}
 
-    With `command` as the first column it stands in place of the run's label.
-    """
+
+def fill_runs(arguments: str) -> list[str]:
+    """`NAME... | COLUMN; HEAD=COLUMN; ...`, a run a row, named by its label or by its command."""
     names, _, words = arguments.partition("|")
-    columns = [word.strip() for word in words.split(";") if word.strip()] or list(USUAL)
-    pairs = [column.split("=", 1) if "=" in column else (column, column) for column in columns]
-    results = [read_result(name) for name in choose(names.split())]
-    if columns[0] == "command":
-        rows = [
-            [f"`{r['command']}`", *(find_cell(r, one) for _, one in pairs[1:])] for r in results
-        ]
-        return make_table([head for head, _ in pairs], rows)
-    rows = [[r["label"], *(find_cell(r, column) for _, column in pairs)] for r in results]
-    return make_table(["run", *(head for head, _ in pairs)], rows)
+    columns = split_columns(words)
+    name = "command" if columns.pop("command", None) else "run"
+    rows = []
+    for result in map(read_result, choose(names.split())):
+        first = result["label"] if name == "run" else f"`{result['command']}`"
+        rows.append([first, *(find_cell(result, column) for column in columns.values())])
+    return make_table([name, *columns], rows)
 
 
 def fill_sizes(arguments: str) -> list[str]:
-    """`NAME... | SIZE... | HEAD=COLUMN; ... | ERROR`: COLUMNs of the finest, ERROR of all."""
-    names, sizes, columns, error = (part.strip() for part in arguments.split("|"))
-    pairs = [column.strip().split("=", 1) for column in columns.split(";") if column.strip()]
+    """`NAME... | SIZE... | HEAD=COLUMN; ... | ERROR`: runs NAME-SIZE; COLUMNs of the finest."""
+    names, words, columns, error = (part.strip() for part in arguments.split("|"))
+    sizes = words.split()
+    shown = split_columns(columns)
     rows = []
     for name in names.split():
-        results = [read_result(f"{name}-{size}") for size in sizes.split()]
-        label = results[-1]["label"].partition(f", {sizes.split()[-1]} cells")[0]
-        known = [find_cell(results[-1], column) for _, column in pairs]
+        results = [read_result(f"{name}-{size}") for size in sizes]
+        label = results[-1]["label"].partition(f", {sizes[-1]} cells")[0]
+        known = [find_cell(results[-1], column) for column in shown.values()]
         errors = [float(find_cell(result, error).rstrip(" %")) for result in results]
         rows.append([label, *known, *(f"{one:+.2f} %" for one in errors)])
-    heads = [f"error at {size} cells" for size in sizes.split()]
-    return make_table(["run", *(head for head, _ in pairs), *heads], rows)
+    return make_table(["run", *shown, *(f"error at {size} cells" for size in sizes)], rows)
 
 
 def fill_verify(arguments: str) -> list[str]:

@@ -11,18 +11,16 @@ from __future__ import annotations
 import ast
 import json
 import re
-import shutil
 from importlib import metadata
 from pathlib import Path
 
 from mkdocs.structure.files import File, Files
+from pylatexenc.latex2text import LatexNodes2Text
 
 import shockgrid
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("shockgrid", "runs", "problems", "hydro", "regrid")
-# a copy of the packages as they are installed, for the docstring reader (mkdocs.yml)
-INSTALLED = ROOT / "build" / "packages" / "shockgrid"
 MATHJAX = "django-static-mathjax"  # no more than MathJax's files in a wheel
 WANTED = ("tex-chtml.js", "output/chtml/fonts/woff-v2/")
 
@@ -43,14 +41,6 @@ def find_module(name: str) -> Path:
     parts = name.split(".")
     inside = len(parts) > 1 and parts[1] in PACKAGES
     return ROOT.joinpath(*parts[1:] if inside else parts)
-
-
-def copy_packages() -> None:
-    """Copy the packages to where the docstring reader finds them under their import names."""
-    shutil.rmtree(INSTALLED, ignore_errors=True)
-    for package in PACKAGES:
-        target = INSTALLED if package == "shockgrid" else INSTALLED / package
-        shutil.copytree(ROOT / package, target, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 def name_page(room: Path) -> str:
@@ -93,11 +83,6 @@ def find_sentence(module: str, name: str) -> str:
     return re.split(r"(?<=\.) (?=[A-Z])", first)[0].replace("|", "\\|")
 
 
-def on_startup(command: str, dirty: bool) -> None:
-    """Copy the packages before the docstring reader looks for its folder."""
-    copy_packages()
-
-
 def on_config(config):
     """Put the reference into the navigation, that of `shockgrid` first, and list the problems."""
     problems = sorted(Path(config.docs_dir, "problems").glob("*.md"))
@@ -128,38 +113,15 @@ def on_files(files: Files, config):
     return files
 
 
-GREEK = dict(
-    zip(
-        "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi "
-        "chi psi omega Gamma Delta Theta Lambda Pi Sigma Phi Psi Omega".split(),
-        "αβγδεζηθκλμνξπρστφχψωΓΔΘΛΠΣΦΨΩ",
-        strict=True,
-    )
-)
-SIGNS = {
-    "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "lt": "<", "gt": ">", "times": "×", "cdot": "·",
-    "approx": "≈", "sim": "~", "pm": "±", "partial": "∂", "nabla": "∇", "infty": "∞", "sum": "Σ",
-    "int": "∫", "to": "→", "in": "∈", "neq": "≠", "ne": "≠", "propto": "∝", "ll": "≪", "gg": "≫",
-    "quad": " ", "qquad": " ", "sqrt": "√", "dots": "...", "ldots": "...", "cdots": "...",
-}  # fmt: skip
 FORMULA = re.compile(r"\\\((.+?)\\\)|\\\[(.+?)\\\]|\$\$(.+?)\$\$", re.S)
-
 FORMULA_OF_NOTEBOOK = re.compile(r"\$\$(.+?)\$\$|\$([^$\n]+)\$", re.S)
+PLAIN = LatexNodes2Text(math_mode="text")
 
 
-def write_plainly(tex: str) -> str:
+def write_plainly(found: re.Match) -> str:
     """A formula in plain signs, as a hit of the search shows it: `k a_0` for `\\(k\\,a_0\\)`."""
-    group = r"\{([^{}]*)\}"
-    for _ in range(4):  # from the inside
-        tex = re.sub(rf"\\[dt]?frac\s*{group}\s*{group}", r"(\1)/(\2)", tex)
-        tex = re.sub(rf"\\(?:mathrm|mathbf|mathit|text|operatorname|bar|hat|tilde|vec)\s*{group}",
-                     r"\1", tex)  # fmt: skip
-        tex = re.sub(rf"([_^]){group}", r"\1\2", tex)
-    tex = re.sub(
-        r"\\([A-Za-z]+) ?", lambda found: {**GREEK, **SIGNS}.get(found[1], found[1] + " "), tex
-    )
-    tex = re.sub(r"\\[,;:! ]", " ", tex)
-    return " ".join(re.sub(r"[{}\\]|&amp;", " ", tex).split())
+    tex = next(filter(None, found.groups()))
+    return " ".join(PLAIN.latex_to_text(tex.replace("&amp;", " ")).split())
 
 
 def clean_entry(location: str, text: str) -> str:
@@ -167,7 +129,7 @@ def clean_entry(location: str, text: str) -> str:
     if location.startswith("reference/"):
         text = text.partition("Source code in <code>")[0]
     formulas = FORMULA_OF_NOTEBOOK if location.startswith("notebooks/") else FORMULA
-    return formulas.sub(lambda found: write_plainly(next(filter(None, found.groups()))), text)
+    return formulas.sub(write_plainly, text)
 
 
 def on_post_build(config):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -43,6 +44,11 @@ def shockgrid(capfd, monkeypatch):
     return call
 
 
+def hear_hang_ups() -> None:
+    """Let a new process end by SIGHUP, though tests run under `nohup`."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.fixture
 def spawn():
     """Start the command line in another process, killed at the end of the test if need be."""
@@ -56,6 +62,7 @@ def spawn():
             stderr=subprocess.PIPE,
             text=True,
             env=environment,
+            preexec_fn=hear_hang_ups if os.name == "posix" else None,
         )
         started.append(process)
         return process

@@ -89,7 +89,7 @@ def test_a_flow_that_ends_early_ends_well_with_the_setting_that_is_told(shockgri
     assert end.step == RunData("run").history["step"][-1]
     (line,) = [line for line in error.splitlines() if "--set mesh=fixed" in line]
     words = shlex.split(line.partition("shockgrid:")[2].partition("   (")[0])
-    code, screen, _ = shockgrid(*words[1:], "-q", "-o", "again")
+    code, screen, _ = shockgrid(*words[1:], "-o", "again")
     assert code == 0 and "t_end reached" in screen
     state = RunData("again").outputs[-1].state()
     assert state["clock/t"] == 1.0 > end.t and state["gas/state"][0].min() > 0.0

@@ -24,8 +24,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from shockgrid.regrid.barrier.functional import smooth_area
-from shockgrid.regrid.jit import inlined, kernel
+from shockgrid.regrid.jit import kernel
 
 SHARP_CORNER_SINE = 0.3  # corner sine below which the barrier is strengthened
 CENTRE_E2 = 1e-6  # the centre of a cell with positive corners may be folded
@@ -644,13 +646,6 @@ def fill_product(nodes, direction, functional, out, Z):
             add_to_nodes(Z, OTHER_EDGE, i, j, n, out)
 
 
-@inlined
-def keep_less(least, value):
-    """The lesser of the two; NaN once either is NaN, which `min` would lose."""
-    takes_value = (value < least) | (value != value)
-    return value if takes_value else least
-
-
 @kernel(allocates=False)
 def compare_corners(nodes, old, inverse, shape, Z):
     """Smallest ratio of a corner's volume to that in `old`, and smallest scaled volume.
@@ -675,15 +670,16 @@ def compare_corners(nodes, old, inverse, shape, Z):
                     old_volume = Z[row + to_old + k]
                     Z[row + to_old + k] = old_volume if old_volume > 0.0 else 1.0
                 for k in range(padded):
+                    # np.minimum keeps a NaN, min() loses it
                     new_volume = Z[row + k]
                     ratio = new_volume / Z[row + to_old + k]
-                    Z[LEAST_RATIO_ROW + k] = keep_less(Z[LEAST_RATIO_ROW + k], ratio)
-                    Z[LEAST_VOLUME_ROW + k] = keep_less(Z[LEAST_VOLUME_ROW + k], new_volume)
+                    Z[LEAST_RATIO_ROW + k] = np.minimum(Z[LEAST_RATIO_ROW + k], ratio)
+                    Z[LEAST_VOLUME_ROW + k] = np.minimum(Z[LEAST_VOLUME_ROW + k], new_volume)
     least_ratio = math.inf
     least_volume = math.inf
     for k in range(n):
-        least_ratio = keep_less(least_ratio, Z[LEAST_RATIO_ROW + k])
-        least_volume = keep_less(least_volume, Z[LEAST_VOLUME_ROW + k])
+        least_ratio = np.minimum(least_ratio, Z[LEAST_RATIO_ROW + k])
+        least_volume = np.minimum(least_volume, Z[LEAST_VOLUME_ROW + k])
     return least_ratio, least_volume
 
 

@@ -264,6 +264,10 @@ class Deck(DeckTable, kw_only=True):
         are appended to `names`."""
         return self
 
+    def find_cautions(self) -> list[str]:
+        """Cautions that follow from keys which all decks of its kind have."""
+        return []
+
 
 MOST_POINTS = 10_000  # of all gauges together
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from shockgrid.hydro.simulation import Simulation
 
 # `run_data` is runs.store.reader.RunData; the import would point the wrong way, hence Any.
-LARGEST_CFL_OF_SPALL = 0.4  # up to here plates with spall kept their speeds in all impacts tried
 AnyDeck: TypeAlias = Deck  # inside Problem the name Deck means the problem's own deck
 DrawFigure = Callable[["Figure", Any], None]
 
@@ -56,18 +55,6 @@ def plan_blocks(grids: Mapping[str, np.ndarray]) -> list[BlockPlan]:
         low, high = ((float(x), float(y)) for x, y in (nodes.min((1, 2)), nodes.max((1, 2))))
         plans.append(BlockPlan(name, (nodes.shape[1] - 1, nodes.shape[2] - 1), low, high))
     return plans
-
-
-def _caution_spall(deck: Deck) -> list[str]:
-    """Whether broken cells may gain kinetic energy at the cost of their internal energy."""
-    control = getattr(deck, "run", None)
-    if not getattr(deck, "spall", False) or control is None or control.cfl <= LARGEST_CFL_OF_SPALL:
-        return []
-    return [
-        f"with spall and run.cfl = {control.cfl:g} broken cells may gain more kinetic energy than "
-        "the bodies have, and bodies their speed; the total energy does not show it: compare "
-        f"with run.cfl={LARGEST_CFL_OF_SPALL:g}"
-    ]
 
 
 class Problem:
@@ -248,7 +235,7 @@ class Problem:
 
     def cautions_on(self, history: History | None = None) -> list[str]:
         """The cautions about a run with this history; without one, about the deck alone."""
-        return _caution_spall(self.deck) + self.cautions(RunSoFar(self, history))
+        return self.deck.find_cautions() + self.cautions(RunSoFar(self, history))
 
     def summary(self, history: History, final: Evolution | None = None) -> str:
         """The report as text."""

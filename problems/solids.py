@@ -28,6 +28,8 @@ from shockgrid.problems.deck import Deck, DeckTable, key
 from shockgrid.problems.references.elastic_plastic import Solid, make_solid_at_rest
 from shockgrid.regrid.errors import BadInput
 
+LARGEST_CFL_OF_SPALL = 0.4  # up to here plates with spall kept their speeds in all impacts tried
+
 Table = dict[str, bool | int | float | str]
 SolidMaterial = key(str | Table, "a name, FILE.toml:NAME, or a table with eos, rho0 and so on")
 # of one body; of all bodies, or a table of what holds for each of them
@@ -54,6 +56,17 @@ class SolidDeck(Deck, kw_only=True):
 
     strength: Strength = False
     spall: Spall = False
+
+    def find_cautions(self) -> list[str]:
+        """Whether broken cells may gain kinetic energy at the cost of their internal energy."""
+        cfl = self.run.cfl
+        if not self.spall or cfl <= LARGEST_CFL_OF_SPALL:
+            return []
+        return [
+            f"with spall and run.cfl = {cfl:g} broken cells may gain more kinetic energy than the "
+            "bodies have, and bodies their speed; the total energy does not show it: compare with "
+            f"run.cfl={LARGEST_CFL_OF_SPALL:g}"
+        ]
 
 
 class BodyTable(DeckTable, kw_only=True):

@@ -164,7 +164,9 @@ def main(folder: Path, names: list[str]) -> None:
             run = find_run(folder, picture, name)
             make_film(picture["film"], run, DOCS / "pictures" / f"{name}.gif")
         else:
-            draw_picture(picture, folder).savefig(DOCS / "pictures" / f"{name}.png")
+            path = DOCS / "pictures" / f"{name}.png"
+            draw_picture(picture, folder).savefig(path)
+            Image.open(path).convert("RGB").quantize(256, dither=0).save(path, optimize=True)
 
 
 if __name__ == "__main__":

@@ -121,7 +121,7 @@ def draw_picture(picture: dict, folder: Path):
 
     mosaic = [list(row) for row in picture["mosaic"]]
     options = {"width_ratios": picture.get("widths"), "layout": "constrained"}
-    figure, axes = plt.subplot_mosaic(mosaic, figsize=picture["size"], dpi=140, **options)
+    figure, axes = plt.subplot_mosaic(mosaic, figsize=picture["size"], dpi=120, **options)
     shown = None
     for letter, panel in picture["panels"].items():
         axis = axes[letter]
@@ -166,7 +166,7 @@ def main(folder: Path, names: list[str]) -> None:
         else:
             path = DOCS / "pictures" / f"{name}.png"
             draw_picture(picture, folder).savefig(path)
-            Image.open(path).convert("RGB").quantize(256, dither=0).save(path, optimize=True)
+            Image.open(path).convert("RGB").save(path, optimize=True)
 
 
 if __name__ == "__main__":
